@@ -118,6 +118,22 @@ def test_node_that_the_kernel_holds_is_told_once_and_waited_for_in_the_backgroun
     assert said.count(told) == 1
 
 
+def test_node_that_another_user_runs_is_told_and_followed_until_it_ends(nodes, command, said, monkeypatch):
+    nodes.begin("/laser", replace(command("laser"), words=("/bin/sleep", "1000")), None)
+    process = nodes._running["/laser"]
+
+    def refuse(group, number):
+        raise PermissionError(1, "Operation not permitted")
+
+    with monkeypatch.context() as moment:
+        moment.setattr(processes.os, "killpg", refuse)
+        nodes.end(["/laser"], patience=False)
+    assert said[-1] == f"process {process.pid} (/laser) can't be ended: {node_processes.FOREIGN}"
+    assert nodes._held == [process]
+    process.signal(signal.SIGKILL)
+    wait_for(lambda: nodes.take_ended() or not nodes._held, "its end is noticed")
+
+
 def test_processes_that_stand_by_are_started_one_by_one(nodes, prepared, begun):
     assert not nodes.stand_by(begun, may_start=False)
     assert [nodes.stand_by(begun, may_start=True) for _ in range(3)] == [True, True, False]
@@ -243,3 +259,16 @@ def test_node_of_a_successor_is_not_asked_to_end(nodes, command, monkeypatch, la
     (process,) = nodes._running.values()
     nodes._ask_to_end("/a", process)
     assert asked == (["/a"] if is_asked else [])
+
+
+def test_node_that_its_launch_prefix_runs_as_another_user_is_asked_to_end(nodes, command, monkeypatch):
+    asked = []
+    nodes.begin("/a", replace(command("a"), words=("/bin/true",)), None)
+    (process,) = nodes._running.values()
+    lineage = (ProcessFacts(1, "node"), ProcessFacts(process.pid, "sudo -E node"), ProcessFacts(2, "launcher"))
+    monkeypatch.setattr(NodeApi, "address", lambda _name: "http://localhost:1/")
+    monkeypatch.setattr(NodeApi, "ask_pid", lambda _uri: 1)
+    monkeypatch.setattr(NodeApi, "request_shutdown", lambda name, _reason: asked.append(name) or True)
+    monkeypatch.setattr(node_processes, "look_up", lambda _name: Answer(True, True, lineage, "http://localhost:1/"))
+    nodes._ask_to_end("/a", process)
+    assert asked == ["/a"]

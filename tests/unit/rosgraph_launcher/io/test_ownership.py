@@ -126,3 +126,16 @@ def test_process_names_the_launcher_that_started_it(answer, serve, monkeypatch):
     found = ownership.look_up("/n")
     assert found.may_be_of(LAUNCHER, "7@1.5")
     assert not found.may_be_of(LAUNCHER, "8@1.5")
+
+
+def test_host_that_the_name_service_did_not_know_is_asked_about_again(monkeypatch):
+    known, now = [set(), {"127.0.1.1"}], [0.0]
+    monkeypatch.setattr(ownership, "resolved", lambda _host: known.pop(0))
+    monkeypatch.setattr(ownership.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(ownership, "_hosts", {})
+    assert not ownership.is_this_host("robot.local")
+    assert not ownership.is_this_host("robot.local")  # nobody is asked: that may take seconds
+    now[0] += ownership.NO_LASTS
+    assert ownership.is_this_host("robot.local")
+    now[0] += ownership.NO_LASTS
+    assert ownership.is_this_host("robot.local")  # for good

@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import psutil
@@ -310,3 +311,10 @@ def test_what_an_earlier_owner_left_is_killed_and_nothing_else(tmp_path):
         other.kill()
         left.wait()
         other.wait()
+
+
+def test_end_is_waited_for_however_long_it_may_take(command):
+    process = processes.start(command("sleep 1000", python=False))
+    threading.Timer(0.1, process.signal, [signal.SIGKILL]).start()
+    assert processes.wait_for_ends([process], 1e12)
+    process.close()

@@ -36,7 +36,7 @@ def nodes():
     managed = ManagedNodes(POLICY)
     change(managed, "first", described("/a", "/b"), ["/a", "/b"])
     for name in ("/a", "/b"):
-        managed.inspected(name, {f"{name}/topic"})
+        managed.inspected(name, {f"{name}/topic"}, 1.0)
     return managed
 
 
@@ -57,8 +57,9 @@ def test_node_that_neither_ran_nor_is_started_does_not_belong_to_the_configurati
     assert nodes.report("f").nodes == ("/a", "/b")
 
 
-def test_node_that_has_done_its_work_is_forgotten_with_its_configuration(nodes):
-    nodes.inspected("/b", set())
+def test_node_that_has_done_its_work_is_forgotten_with_its_configuration():
+    nodes = ManagedNodes(POLICY)
+    change(nodes, "first", described("/a", "/b"), ["/a", "/b"])
     nodes.ended("/b", 0, 5.0)
     assert (nodes.names, nodes.needed) == (("/a", "/b"), ("/a",))
     change(nodes, "second", described("/a"), [])  # nobody asks to stop what has ended
@@ -152,7 +153,7 @@ def test_restart_that_is_impossible_counts_as_a_death(nodes):
 def test_only_a_node_without_topics_and_services_may_end_with_status_0(advertised, respawn, verdict):
     nodes = ManagedNodes(POLICY)
     change(nodes, "first", described("/a", respawn=respawn), ["/a"])
-    nodes.inspected("/a", advertised)
+    nodes.inspected("/a", advertised, 1.0)
     assert nodes.ended("/a", 0, 2.0).verdict is verdict
     assert nodes.report("f").nodes == (() if verdict is Verdict.FINISHED else ("/a",))
 
@@ -268,13 +269,35 @@ def test_end_of_a_required_node_fails_its_configuration_at_once(status):
     assert ending.text.endswith("; it is required: first is stopped")
 
 
-def test_node_is_inspected_once_when_it_has_had_time_to_advertise():
-    nodes = ManagedNodes(POLICY)
-    change(nodes, "first", described("/a"), ["/a"], now=5.0)
-    assert nodes.to_inspect(5.5) == []
-    assert nodes.to_inspect(6.5) == ["/a"]
-    nodes.inspected("/a", ())
-    assert nodes.to_inspect(9.0) == []
+@pytest.fixture
+def young():
+    """A node that starts at 5 s."""
+    managed = ManagedNodes(POLICY)
+    change(managed, "first", described("/a"), ["/a"], now=5.0)
+    return managed
+
+
+def test_node_is_inspected_when_it_has_had_time_to_advertise_and_no_more_once_it_has(young):
+    assert young.to_inspect(5.5) == []
+    assert young.to_inspect(6.5) == ["/a"]
+    young.inspected("/a", {"/scan"}, 6.5)
+    assert young.to_inspect(1000.0) == []
+
+
+def test_node_that_advertises_nothing_is_inspected_again_in_growing_gaps(young):
+    looks = []
+    for now in range(5, 205):
+        if young.to_inspect(float(now)):
+            looks.append(now - 5)
+            young.inspected("/a", (), float(now))
+    assert looks == [1, 2, 4, 8, 16, 32, 62, 92, 122, 152, 182]
+
+
+def test_node_that_advertises_late_has_not_done_its_work_when_it_ends(young):
+    young.inspected("/a", (), 6.0)
+    young.inspected("/a", {"/detections"}, 7.0)
+    young.inspected("/a", (), 99.9)  # it unregisters while it ends
+    assert young.ended("/a", 0, 100.0).verdict is Verdict.RESTART
 
 
 def test_release_leaves_nothing(nodes):
@@ -296,7 +319,7 @@ def test_warm_processes_wait_until_the_new_nodes_have_had_time_for_their_imports
 def shared(nodes):
     """Function f with /a and /b, and function g with /b and /c."""
     change(nodes, "other", described("/b", "/c"), ["/c"], function="g")
-    nodes.inspected("/c", {"/c/topic"})
+    nodes.inspected("/c", {"/c/topic"}, 1.0)
     return nodes
 
 

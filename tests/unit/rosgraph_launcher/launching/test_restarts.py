@@ -30,3 +30,8 @@ def test_another_configuration_starts_without_deaths():
 
 def test_no_restart_at_all_can_be_had():
     assert DeathCounter(RestartPolicy(intensity=0)).count("/a", 0.0) is None
+
+
+def test_node_may_die_as_often_as_one_likes():
+    counter = DeathCounter(RestartPolicy(intensity=10_000, period=1e6, longest_delay=5.0))
+    assert [counter.count("/a", float(death)) - death for death in range(1100)][-1] == 5.0

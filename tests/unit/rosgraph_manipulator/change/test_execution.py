@@ -121,6 +121,27 @@ def test_function_is_released_although_the_master_is_silent_and_its_parameters_a
     assert around.server["/speed"] == 3
 
 
+def test_successor_does_not_restore_again_what_was_restored(around):
+    execution = execution_of(around, Launchers(), all_up)
+    change(execution)
+    execution.release("f")
+    left = OverwrittenParameters.from_parameter(around.server["/rosgraph_manipulator/overwritten"])
+    assert left.transition({}) == ({}, [])
+
+
+def test_what_could_not_be_handed_over_after_a_restoration_is_later(around, failing):
+    execution = execution_of(around, Launchers(), all_up)
+    change(execution)
+    error = SilentError("the master does not answer", "timed out")
+    failing(around, "set_parameters", error, lambda values, **_: "/speed" not in values, times=1)
+    execution.release("f")
+    around.server["/speed"] = 3  # by somebody else
+    execution.catch_up()
+    left = OverwrittenParameters.from_parameter(around.server["/rosgraph_manipulator/overwritten"])
+    assert left.transition({}) == ({}, [])
+    assert around.server["/speed"] == 3
+
+
 # -- recovery
 
 

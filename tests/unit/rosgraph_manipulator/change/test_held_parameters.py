@@ -6,7 +6,7 @@ import pytest
 from node_kit.io.xml_rpc import SilentError
 from rosgraph_manipulator.change.held_parameters import HeldParameters
 
-WANTED = {"/a/x": 1, "/a/y": "s", "/ab/x": 2, "/shared": 3}
+WANTED = {"/a/inner/x": 4, "/a/x": 1, "/a/y": "s", "/ab/x": 2, "/shared": 3}
 
 
 class Around:
@@ -44,11 +44,11 @@ def up():
 
 @pytest.fixture
 def held(around, up):
-    return HeldParameters("f", WANTED, up.__contains__, around)
+    return HeldParameters("f", WANTED, ["/a", "/ab", "/a/inner"], up.__contains__, around)
 
 
 def test_what_somebody_changes_or_deletes_is_put_back_and_told(around, held):
-    around.server = {"/a/x": "other", "/ab/x": 2.0, "/shared": 3}
+    around.server = {"/a/inner/x": 4, "/a/x": "other", "/ab/x": 2.0, "/shared": 3}
     held.look(["/a", "/ab"])
     assert around.server == {**WANTED, "/ab/x": 2.0}  # which is the same value
     assert around.said == ["f: put back, because nodes start: /a/x, /a/y"]
@@ -101,3 +101,10 @@ def test_nothing_is_asked_where_no_node_has_parameters_or_all_are_up(around, up,
     up.add("/a")
     held.look(["/a"])
     assert around.looks == 0
+
+
+def test_node_whose_name_is_in_the_namespace_of_another_may_set_its_own(around, up, held):
+    around.server |= {"/a/x": "other", "/a/inner/x": "other"}
+    up.add("/a/inner")
+    held.look(["/a"])
+    assert around.server == {**WANTED, "/a/inner/x": "other"}

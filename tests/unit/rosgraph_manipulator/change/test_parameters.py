@@ -11,6 +11,7 @@ def adopt(memory, server, wanted):
     for name in gone:
         server.pop(name, None)
     server.update(values)
+    memory.restored(wanted)
 
 
 def test_nothing_is_left_of_an_earlier_configuration():
@@ -43,3 +44,24 @@ def test_words_tell_what_parameters_had_and_have_again():
     wanted = {f"/arm/{name}": 1 for name in "abcdefg"}
     assert put_back({"/arm/a": 5, "/arm/b": None}, wanted) == "put back: /arm/a (5, not 1), /arm/b (not set, not 1)"
     assert put_back(dict.fromkeys(wanted, 2), wanted).endswith("/arm/e (2, not 1) and 2 more")
+
+
+def test_what_was_restored_belongs_to_others_again():
+    memory, server = OverwrittenParameters(), {"/speed": 1.0}
+    adopt(memory, server, {"/move_base/x": 1, "/speed": 0.5})
+    adopt(memory, server, {})
+    assert server == {"/speed": 1.0}
+    server.update({"/move_base/x": 7, "/speed": 2.0})  # by an operator
+    adopt(memory, server, {"/arm/y": 1})
+    assert server == {"/move_base/x": 7, "/speed": 2.0, "/arm/y": 1}
+    adopt(memory, server, {"/speed": 0.5})
+    adopt(memory, server, {})
+    assert server == {"/move_base/x": 7, "/speed": 2.0}
+    assert memory.as_parameter() == {"before": [], "absent": []}
+
+
+def test_former_values_of_what_is_still_overwritten_are_kept():
+    overwritten = OverwrittenParameters({"/speed": 1, "/width": 2}, ["/a", "/b"])
+    assert overwritten.restored(["/x"], others=["/speed", "/a"])
+    assert overwritten.as_parameter() == {"before": [["/speed", 1]], "absent": ["/a"]}
+    assert not overwritten.restored(["/x"], others=["/speed", "/a"])

@@ -164,6 +164,13 @@ def test_node_whose_parameters_are_uncertain_differs_until_the_launcher_has_set_
     assert not compare(progress.running_system("f", described), described).touches_nodes
 
 
+def test_parameters_of_a_node_inside_the_namespace_of_another_are_uncertain_alone(progress):
+    progress.take(reports(nodes=("/a", "/a/inner")))
+    described = system(**{"a": {"speed": 1}, "a/inner": {"speed": 1}})
+    progress.parameters_change("/a/inner/costmap")
+    assert list(compare(progress.running_system("f", described), described).parameters) == ["/a/inner"]
+
+
 def test_of_a_configuration_without_description_only_the_names_are_known(progress):
     difference = compare(progress.running_system("f", None), system(b={}))
     assert (difference.stops, difference.replaced) == (("/a",), ("/b",))

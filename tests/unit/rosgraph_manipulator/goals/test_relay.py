@@ -2,7 +2,7 @@
 
 import pytest
 from actionlib_msgs.msg import GoalStatus
-from rosgraph_manipulator.goals.relay import Ending, Link
+from rosgraph_manipulator.goals.relay import Ending, Link, ServedFunctions
 
 
 def sent():
@@ -53,3 +53,34 @@ def test_goal_taken_back_without_a_server_ends_at_once():
     link = Link()
     assert link.cancel() is Ending.CANCELLED
     assert not link.needs_sending(changing=False)
+
+
+NAVIGATES = {"f_navigate": ["/move_base"], "f_pick": ["/arm", "/camera"]}
+
+
+def test_only_the_function_that_the_relay_was_given_concerns_it():
+    served = ServedFunctions("f_navigate")
+    served.launched("/rosgraph_launcher", NAVIGATES)
+    served.served_by(["/arm"])
+    assert not served.concern({"f_pick"})
+    assert served.concern({"f_pick", "f_navigate"})
+
+
+def test_functions_whose_nodes_serve_the_action_concern_the_relay_and_all_do_until_they_are_known():
+    served = ServedFunctions()
+    served.served_by(["/move_base"])
+    assert served.concern({"f_pick"})
+    assert not served.concern(set())
+    served.launched("/rosgraph_launcher", NAVIGATES)
+    served.served_by(["/move_base"])
+    assert (served.concern({"f_pick"}), served.concern({"f_navigate"})) == (False, True)
+    served.served_by([])  # while there is no server, or one that nobody has launched
+    assert (served.concern({"f_pick"}), served.concern({"f_navigate"})) == (False, True)
+
+
+def test_server_that_several_functions_share_on_two_hosts_concerns_them_all():
+    served = ServedFunctions()
+    served.launched("/rosgraph_launcher", NAVIGATES)
+    served.launched("/rosgraph_launcher_box", {"f_explore": ["/move_base"], "f_pick": ["/arm"]})
+    served.served_by(["/move_base"])
+    assert [served.concern({name}) for name in ("f_navigate", "f_explore", "f_pick")] == [True, True, False]

@@ -120,3 +120,30 @@ def test_key_that_the_nodes_file_has_no_longer_is_removed(tmp_path, monkeypatch)
     assert told["set"] == {"/cell/configurations": {"a": {"launch": "x"}}, "/cell/kill_nodes": []}
     assert {"/cell/functions", "/cell/save_action", "/cell/goal_msg_type"} < set(told["gone"])
     assert not told["set"].keys() & set(told["gone"])
+
+
+def test_missing_absolute_path_of_a_command_concerns_its_configuration_alone(tmp_path, launch_file):
+    (tmp_path / "old" / "deep").mkdir(parents=True)
+    (tmp_path / "old" / "deep" / "nav.launch").write_text("<launch/>")
+    entries = {
+        "ok": {"launch": str(launch_file)},
+        "mistyped": {"command": f"roslaunch {tmp_path}/nav/nav.launch"},
+        "at_the_root": {"command": "roslaunch /nav_missing.launch"},
+    }
+    found = options_from({"configurations": entries}).configurations
+    assert found["ok"].problem == ""
+    for name, path in (("mistyped", f"{tmp_path}/nav/nav.launch"), ("at_the_root", "/nav_missing.launch")):
+        remedy = "correct the name, or generate it"
+        assert found[name].problem == f"configurations/{name}: there is no launch file {path}: {remedy}"
+
+
+@pytest.mark.parametrize(
+    ("file", "is_found"),
+    [("f1_v1_r1.launch", True), ("variants/f1_v1_r1.launch", True), ("no_such_folder/f1_v1_r1.launch", False)],
+)
+def test_file_of_a_command_is_searched_in_its_package_with_the_folder_that_is_given(file, is_found):
+    entries = {
+        "a": {"command": f"roslaunch metacontrol_sim {file}"},
+        "b": {"command": "roslaunch metacontrol_sim f1_v1_r1.launch"},
+    }
+    assert (options_from({"configurations": entries}).configurations["a"].problem == "") is is_found

@@ -33,6 +33,16 @@ def test_nodes_keep_their_parameters_remaps_and_environment(tmp_path):
     assert launch.system.parameters == {"/shared": 1}
 
 
+def test_parameter_belongs_to_the_innermost_node_in_whose_namespace_it_is(tmp_path):
+    inner = '<node name="controller" pkg="move_base" type="move_base"><param name="gain" value="1"/></node>'
+    body = f"""<node name="arm" pkg="move_base" type="move_base"><param name="speed" value="2"/></node>
+      <group ns="arm">{inner}</group><param name="arm/controllers" value="3"/>"""
+    launch = read_launch_file(write(tmp_path, body))
+    parameters = {name: node.parameters for name, node in launch.system.nodes.items()}
+    assert parameters == {"/arm": {"speed": 2, "controllers": 3}, "/arm/controller": {"gain": 1}}
+    assert launch.system.parameters == {}
+
+
 def test_all_that_a_start_needs_is_in_the_description(tmp_path):
     body = f"""<machine name="here" address="localhost" default="never"/>
       {NODE} respawn="true" respawn_delay="2.5" machine="here" launch-prefix="nice" cwd="node"/>

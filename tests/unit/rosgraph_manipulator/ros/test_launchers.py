@@ -26,12 +26,15 @@ class Surroundings:
         parameters: on the master; None: it does not answer.
         connected: who is connected.
         living: whose API answers.
+        hosts: names of those of launchers that are not `localhost`.
+        pids: process ids of launchers that are not 1.
         change: what a launcher answers to a request.
         requests: what launchers were asked, with their names.
     """
 
     def __init__(self):
         self.parameters = {f"{MAIN}/addresses": ["robot"], f"{SECOND}/addresses": ["box"]}
+        self.hosts, self.pids = {}, {}
         self.connected = {MAIN, SECOND, STRANGER}
         self.living = {MAIN, SECOND, STRANGER}
         self.change = lambda: ChangeNodesResponse(ok=True, change=4)
@@ -50,10 +53,11 @@ class Surroundings:
         return [SimpleNamespace(callerid_pub=name) for name in self.connected]
 
     def address(self, name):
-        return f"http://localhost:1{name}"
+        return f"http://{self.hosts.get(name, 'localhost')}:1{name}"
 
     def pid(self, uri):
-        return 1 if self.is_answering(uri.partition("1")[2]) else None
+        name = uri.partition(":1")[2]
+        return self.pids.get(name, 1) if self.is_answering(name) else None
 
     def is_answering(self, name):
         return name in self.living
@@ -98,10 +102,11 @@ def followed(around):
     return Launchers(timeout=0.1, host_timeout=0.0)
 
 
-def tell(followed, who, change=3, nodes=("/nav",), configuration="slow"):
+def tell(followed, who, change=3, nodes=("/nav",), configuration="slow", header=None):
+    """Have a launcher tell what it has; without the header of a connection, over a new one."""
     report = LaunchedFunction("f", configuration, change, "STABLE", list(nodes), [], "")
     message = LaunchedFunctions(functions=[report])
-    message._connection_header = {"callerid": who}
+    message._connection_header = header or {"callerid": who}
     followed._take(message)
 
 
@@ -165,6 +170,50 @@ def test_function_of_a_second_launcher_that_has_ended_fails_and_can_be_changed(f
     assert report.message.endswith("and ran /arm: start it again")
     ask(followed, NODE)
     assert [name for name, _ in around.requests] == [MAIN]
+
+
+MOVED_NODE = NodeDescription("/arm", "/", "p", "x", machine="arm-pc")
+
+
+def move(around, name):
+    around.parameters[f"{name}/addresses"] = ["arm-pc"]
+    around.hosts[name] = "192.0.2.7"
+
+
+@pytest.mark.parametrize("name", [MAIN, SECOND])
+def test_launcher_that_is_started_again_for_another_host_is_found_there(followed, around, name):
+    tell(followed, name)
+    assert (followed._find("arm-pc"), followed._known[name].is_here) == ("", True)
+    move(around, name)
+    tell(followed, name)
+    assert (followed._find("arm-pc"), followed.is_here(MOVED_NODE)) == (name, False)
+    assert followed._find("box") == ""
+
+
+def test_launcher_is_read_again_over_the_same_connection_only_where_its_process_is_another_one(followed, around):
+    header = {"callerid": SECOND}
+    tell(followed, SECOND, header=header)
+    followed._look_around()
+    move(around, SECOND)
+    tell(followed, SECOND, header=header)
+    followed._look_around()
+    assert followed._find("box") == SECOND
+    around.pids[SECOND] = 2
+    followed._look_around()
+    assert followed._find("arm-pc") == SECOND
+
+
+def test_launcher_that_can_not_be_read_again_stays_where_it_was_until_the_master_answers(followed, around):
+    tell(followed, MAIN)
+    tell(followed, SECOND)
+    move(around, SECOND)
+    known, around.parameters = around.parameters, None
+    tell(followed, SECOND)
+    followed._look_around()
+    assert followed._find("box") == SECOND
+    around.parameters = known
+    followed._look_around()
+    assert (followed._find("box"), followed._find("arm-pc")) == ("", SECOND)
 
 
 def test_launcher_that_takes_a_request_and_gives_no_sign_is_given_up(followed, around):

@@ -5,9 +5,10 @@ import threading
 import pytest
 import rospy
 from actionlib import msg
-from actionlib_msgs.msg import GoalID, GoalStatus
+from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from bad_input.unconnected import unconnected
 from helpers.waiting import wait_for
+from metacontrol_msgs.msg import ActiveConfiguration, FunctionGrounding, LaunchedFunction, LaunchedFunctions
 from rosgraph_manipulator.ros import relay as module
 from rosgraph_manipulator.ros.relay import Relay
 
@@ -98,3 +99,16 @@ def test_goal_that_is_taken_back_while_its_end_is_passed_on(relay):
     cancel = GoalID(id="only")
     while_held(relay._server.lock, lambda: relay._server.internal_cancel_callback(cancel), lambda: succeed(machine))
     wait_for(lambda: status(relay, "only") == GoalStatus.SUCCEEDED, "it has ended")
+
+
+def test_recovery_of_a_function_that_does_not_serve_the_action_keeps_no_goal_waiting(relay):
+    launched = LaunchedFunctions(functions=[LaunchedFunction("f_go", "c", 1, "STABLE", ["/server"], [], "")])
+    launched._connection_header = {"callerid": "/rosgraph_launcher"}
+    relay._on_launched(launched)
+    status_array = GoalStatusArray()
+    status_array._connection_header = {"callerid": "/server"}
+    relay._client.last_status_msg = status_array
+    relay._on_configuration(ActiveConfiguration(functions=[FunctionGrounding("f_pick", "p", "RECOVERING")]))
+    machine = send(relay, "only")
+    machine.update_result(msg.TestActionResult(status=GoalStatus(machine.action_goal.goal_id, GoalStatus.ABORTED, "")))
+    wait_for(lambda: status(relay, "only") == GoalStatus.ABORTED, "the client is told")

@@ -4,6 +4,7 @@ import pytest
 from node_kit.io.background import NoThreadError
 from rosgraph_manipulator.ros import surroundings
 from rosgraph_manipulator.ros.surroundings import RosSurroundings
+from rospy.exceptions import TransportTerminated
 
 
 @pytest.fixture
@@ -23,3 +24,7 @@ def test_change_fails_where_no_thread_asks_the_nodes(around, no_thread):
     with pytest.raises(NoThreadError) as caught:
         around.silent(["/nav"])
     assert isinstance(caught.value, around.failures)
+
+
+def test_node_that_ends_during_a_call_fails_the_change_alone(around):
+    assert issubclass(TransportTerminated, around.failures)

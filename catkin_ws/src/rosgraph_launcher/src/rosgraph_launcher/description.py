@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
@@ -51,6 +51,11 @@ class NodeDescription:
         """Return the names of the attributes, without parameters, in which another node differs."""
         names = (attribute.name for attribute in fields(self) if attribute.name != "parameters")
         return tuple(name for name in names if getattr(self, name) != getattr(other, name))
+
+
+def owner_of(name: str, nodes: Iterable[str]) -> str:
+    """Return the node in whose namespace a name is, the innermost one of several; empty: there is none."""
+    return max((node for node in nodes if name.startswith(f"{node}/")), key=len, default="")
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ REASON = "replaced by another configuration"
 HANG_TIMEOUT = CALL_TIMEOUT + 0.5
 """s, wall, after which a node is killed that does not answer the request: 0.5 s after it got SIGINT. Nothing runs in it
 that could end it in a good way, and the robot waits."""
+FOREIGN = "another user runs it, as with 'sudo' in a launch-prefix, and it may go on: end it as that user"
 MOST_LOST_WARM = 3  # after so many warm processes of one kind that ended by themselves, no further one is started
 
 
@@ -48,7 +49,7 @@ class NodeProcesses:
         self._warm: dict[tuple[Any, ...], Process] = {}
         self._others: tuple[Command, ...] = ()  # of nodes that do not run now
         self._lost_warm: Counter[tuple[Any, ...]] = Counter()
-        self._held: list[Process] = []  # killed, but not ended yet
+        self._held: list[Process] = []  # killed or not to be killed, but not ended yet
         for pid, _ in processes.kill_marked(options.mark):
             log(f"killed process {pid}, which an earlier launcher had left behind")
         self._reaper = processes.start_reaper(options.mark)
@@ -180,9 +181,18 @@ class NodeProcesses:
             self._hanging.add(name)
         except CallError:
             pid = None
-        is_other = pid is None or (pid != process.pid and not look_up(name).may_be_of(self._options.mark, self._id))
+        is_other = pid is None or (pid != process.pid and not self._is_of(process, name))
         if (is_other or not NodeApi.request_shutdown(name, REASON)) and process.status is None:
             process.signal(signal.SIGINT)
+
+    def _is_of(self, process: Process, name: str) -> bool:
+        """Tell whether who answers under the name of a node is, or may be, a child of its process.
+
+        The environment of another user's process, such as after `sudo`, can't be read; its parents can.
+        """
+        answer = look_up(name)
+        is_child = any(one.pid == process.pid for one in answer.lineage)
+        return is_child or answer.may_be_of(self._options.mark, self._id)
 
     def _kill(self, hanging: Mapping[str, Process], why: str) -> None:
         """Kill nodes that hang, if they have not ended."""
@@ -192,11 +202,12 @@ class NodeProcesses:
                 process.signal(signal.SIGKILL)
 
     def _close(self, leaving: Mapping[str, Process]) -> None:
-        """Kill processes, and forget them; those that the kernel holds are looked at again until they have ended."""
+        """Kill processes, and forget them; those that can't be ended are looked at again until they have ended."""
         held = processes.close_all(list(leaving.values()))
         for name, process in leaving.items():
             if process in held:
-                self._log(f"process {process.pid} ({name}) can't be ended: the kernel holds it")
+                why = FOREIGN if process.is_foreign else "the kernel holds it"
+                self._log(f"process {process.pid} ({name}) can't be ended: {why}")
         self._held += held
 
     # -- standby --------------------------------------------------------------------------------------------------

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-import functools
 import os
+import time
 from urllib.parse import urlsplit
 
 import psutil
@@ -14,6 +14,10 @@ from rosgraph_launcher.io.master import NodeApi
 from rosgraph_launcher.io.processes import MARK, OWNER
 from rosgraph_launcher.io.this_host import resolved
 from rosgraph_launcher.launching.ownership import Answer, ProcessFacts
+
+NO_LASTS = 10.0  # s, wall, before the name service is asked again; an answer may take seconds
+_MOST_HOSTS = 256
+_hosts: dict[str, tuple[bool, float]] = {}  # whether each is this one, and until when a no holds
 
 
 def look_up(node: str) -> Answer:
@@ -51,13 +55,21 @@ def command_words(process: psutil.Process) -> list[str]:
     return []
 
 
-@functools.lru_cache(maxsize=256)
 def is_this_host(host: str) -> bool:
-    """Tell whether a name or an address is one of this host."""
-    addresses = resolved(host)
-    return any(one.startswith("127.") or one == "::1" for one in addresses) or bool(
-        addresses & set(rosgraph.network.get_local_addresses())
-    )
+    """Tell whether a name or an address is one of this host.
+
+    A yes is kept for good, a no for NO_LASTS: the name service may have failed.
+    """
+    is_here, until = _hosts.get(host, (False, 0.0))
+    if not is_here and time.monotonic() >= until:
+        addresses = resolved(host)
+        is_here = any(one.startswith("127.") or one == "::1" for one in addresses) or bool(
+            addresses & set(rosgraph.network.get_local_addresses())
+        )
+        if len(_hosts) >= _MOST_HOSTS:
+            _hosts.clear()
+        _hosts[host] = is_here, time.monotonic() + NO_LASTS
+    return is_here
 
 
 def _lineage(process: psutil.Process) -> tuple[ProcessFacts, ...]:

@@ -29,6 +29,7 @@ from node_kit.io.supervisor import owner_id
 
 from rosgraph_launcher.io.pidfds import open_pidfd
 from rosgraph_launcher.io.warm_start.sitecustomize import SETTING
+from rosgraph_launcher.launching.options import LONGEST_TIMEOUT
 
 MARK = "MROS_LAUNCHER"
 """Environment variable of every process that a launcher starts; its value names the launcher and its master."""
@@ -106,6 +107,7 @@ class Process:
     started: float  # time.monotonic()
     pidfd: int = -1  # tells its end; -1: closed
     gate: int = -1  # file descriptor to which its permission to begin is written; -1: it has begun
+    is_foreign: bool = False  # whether the system has refused a signal, because another user runs it now
 
     @property
     def pid(self) -> int:
@@ -140,9 +142,16 @@ class Process:
         self.started = time.monotonic()
 
     def signal(self, number: int) -> None:
-        """Send a signal to the process and to its children in the same process group."""
-        with contextlib.suppress(ProcessLookupError):
+        """Send a signal to the process and to its children in the same process group.
+
+        A group that another user runs, such as root by `sudo` in a launch-prefix, gets none: then `is_foreign` is set.
+        """
+        try:
             os.killpg(self.pid, number)
+        except ProcessLookupError:
+            pass
+        except PermissionError:
+            self.is_foreign = True
 
     def close(self) -> bool:
         """Do what `close_all` does with this process; return whether it has ended."""
@@ -251,7 +260,7 @@ def wait_for_ends(processes: Sequence[Process], timeout: float) -> bool:
         poll = select.poll()
         for process in left:
             poll.register(process.pidfd, select.POLLIN)
-        poll.poll(1000.0 * remaining)
+        poll.poll(1000.0 * min(remaining, LONGEST_TIMEOUT))
         left = [process for process in left if process.status is None]
     return True
 
@@ -260,7 +269,8 @@ def close_all(processes: Sequence[Process]) -> list[Process]:
     """Kill what is left of the process groups, wait for the ends, and close the file descriptors of the processes.
 
     Returns:
-        The processes that have not ended within REAP_TIMEOUT: the kernel holds them, and they end later.
+        The processes that have not ended within REAP_TIMEOUT: the kernel holds them, and they end later; or another
+        user runs them, and they may go on.
     """
     for process in processes:
         process.signal(signal.SIGKILL)

@@ -14,7 +14,8 @@ from rosgraph_launcher.launching.nodelets import loaders
 from rosgraph_launcher.launching.report import CHANGING, FAILED, RECOVERING, STABLE, LauncherReport
 from rosgraph_launcher.launching.restarts import DeathCounter, Ending, Meaning, RestartPolicy, Verdict, meaning_of_end
 
-OFFER_AGE = 1.0  # s after a node's start: by then it has advertised its topics and services
+OFFER_AGE = 1.0  # s after a node's start: by then most nodes have advertised their topics and services
+LONGEST_GAP = 30.0  # s between two looks at a node that has advertised none; each look is one call of the master
 STANDBY_DELAY = 0.5  # s after a change: the imports of a warm process must not slow the new nodes down
 
 
@@ -26,7 +27,8 @@ class _Node:
         description: how it is started.
         started: when its process began; None: it has no process.
         restart_at: when it is started again; None: it is not due.
-        serves: whether it has topics or services of its own; None: nobody has looked yet.
+        inspect_at: when somebody looks next whether it has topics or services of its own, unless they are known.
+        serves: whether it has any, as far as is known.
         finished: whether it has done its work and ended.
         has_died: whether its last process ended by itself.
     """
@@ -34,7 +36,8 @@ class _Node:
     description: NodeDescription
     started: float | None = None
     restart_at: float | None = None
-    serves: bool | None = None
+    inspect_at: float = 0.0
+    serves: bool = False
     finished: bool = False
     has_died: bool = False
 
@@ -213,7 +216,7 @@ class ManagedNodes:
     def started(self, name: str, now: float) -> None:
         """Note that the process of a node has begun."""
         node = self._nodes[name]
-        self._nodes[name] = _Node(node.description, started=now, serves=node.serves or None)
+        self._nodes[name] = _Node(node.description, started=now, inspect_at=now + OFFER_AGE, serves=node.serves)
 
     def stopped(self, name: str) -> None:
         """Note that the process of a node has been ended on purpose."""
@@ -227,17 +230,30 @@ class ManagedNodes:
     # -- supervision ----------------------------------------------------------------------------------------------
 
     def to_inspect(self, now: float) -> list[str]:
-        """Return the nodes that are old enough for `inspected`, and were not inspected yet."""
+        """Return the nodes that are due for `inspected`.
+
+        A node that imports or calibrates for long advertises late. So a node with nothing of its own is looked at again
+        and again: first at twice its age, later every LONGEST_GAP.
+        """
         return [
             name
             for name, node in self._nodes.items()
-            if node.serves is None and node.started is not None and now - node.started > OFFER_AGE
+            if not node.serves and node.started is not None and now >= node.inspect_at
         ]
 
-    def inspected(self, name: str, advertised: Iterable[str]) -> None:
-        """Note the topics and services of a node. A node with none of its own may end when its work is done."""
+    def inspected(self, name: str, advertised: Iterable[str], now: float) -> None:
+        """Note the topics and services of a node. A node that never had any of its own may end when its work is done.
+
+        Args:
+            name: of the node.
+            advertised: the topics and services that it has now.
+            now: the time.
+        """
+        node = self._nodes[name]
         own = {offer for offer in advertised if not offer.startswith((f"{name}/get_logg", "/rosout"))}
-        self._nodes[name] = replace(self._nodes[name], serves=bool(own - {f"{name}/set_logger_level"}))
+        serves = node.serves or bool(own - {f"{name}/set_logger_level"})
+        age = now - node.started if node.started is not None else 0.0
+        self._nodes[name] = replace(node, serves=serves, inspect_at=now + min(max(age, OFFER_AGE), LONGEST_GAP))
 
     def ended(self, name: str, status: int | None, now: float, conflict: str = "") -> Ending:
         """Decide what follows from the end of a node's process.
@@ -255,7 +271,7 @@ class ManagedNodes:
         node = self._nodes[name]
         age = now - node.started if node.started is not None else 0.0
         node = self._nodes[name] = replace(node, started=None, has_died=True)
-        meaning = meaning_of_end(node.description, status, bool(node.serves), bool(conflict))
+        meaning = meaning_of_end(node.description, status, node.serves, bool(conflict))
         if meaning is Meaning.FINISHED:
             self._nodes[name] = replace(node, finished=True)
             return Ending(Verdict.FINISHED, f"node {name} has finished, {age:.1f} s after its start")
@@ -386,11 +402,13 @@ class ManagedNodes:
         """Return the functions other than `name` that need a node."""
         return [other for other in self._needing(node) if other != name]
 
-    def _has_served(self, description: NodeDescription) -> bool | None:
-        """Return whether a node that is started anew had topics or services before; None: nobody knows."""
+    def _has_served(self, description: NodeDescription) -> bool:
+        """Tell whether a node that is started anew is known to have had topics or services before."""
         before = self._nodes.get(description.name)
-        same = before and (before.description.executable, before.description.args)
-        return True if before and before.serves and same == (description.executable, description.args) else None
+        if before is None or not before.serves:
+            return False
+        same = (before.description.executable, before.description.args)
+        return same == (description.executable, description.args)
 
     def _drop_unneeded(self) -> None:
         """Forget nodes that no function has any more, and restarts of those that only failed functions have."""

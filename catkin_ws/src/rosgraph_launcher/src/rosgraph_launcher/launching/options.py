@@ -6,6 +6,9 @@ from dataclasses import dataclass, field
 
 from rosgraph_launcher.launching.restarts import RestartPolicy
 
+LONGEST_TIMEOUT = 86_400.0
+"""s, for each time that a parameter gives: poll and sockets take none of more than 24 days."""
+
 
 @dataclass(frozen=True)
 class LauncherOptions:

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 from rosgraph_launcher.description import NodeDescription
 
+_MOST_DOUBLINGS = 1000  # of a delay; a float holds no more than 1023
+
 
 class Meaning(enum.Enum):
     """What the end of a node means."""
@@ -101,4 +103,4 @@ class DeathCounter:
         self._deaths.append((now, node))
         if len(self._deaths) > self._policy.intensity:
             return None
-        return now + min(self._policy.first_delay * 2**before, self._policy.longest_delay)
+        return now + min(self._policy.first_delay * 2.0 ** min(before, _MOST_DOUBLINGS), self._policy.longest_delay)

@@ -232,10 +232,12 @@ class Supervisor:
     def look_after(self) -> None:
         """Deal with the nodes that have ended, and start again those that are due."""
         now = self._clock()
-        self._inspect(now)
+        self._inspect(self._nodes.to_inspect(now), now)
         stopped: set[str] = set()
         for name, status in self._processes.take_ended().items():
             if name not in stopped:
+                if status == 0:  # the master may still know what it has advertised since the last look
+                    self._inspect([name], now)
                 conflict = self._names.successor(name)
                 stopped.update(self._follow(self._nodes.ended(name, status, now, conflict)))
         for name in self._nodes.to_restart(now):
@@ -244,8 +246,9 @@ class Supervisor:
         for name, conflict in self._nodes.contested.items():
             self._nodes.seen(name, self._names.is_own(name, conflict), now)
         for name in self._nodes.hanging(now):
-            self._end([name], patience=False)
-            self._follow(self._nodes.hung(name, now))
+            if name not in stopped:
+                self._end([name], patience=False)
+                stopped.update(self._follow(self._nodes.hung(name, now)))
         if self._nodes.recovered():
             self._report()
 
@@ -268,10 +271,10 @@ class Supervisor:
                 commands.append(self._commands.command(node))
         self._processes.expect(commands)
 
-    def _inspect(self, now: float) -> None:
-        for name in self._nodes.to_inspect(now):
+    def _inspect(self, names: Iterable[str], now: float) -> None:
+        for name in names:
             try:
-                self._nodes.inspected(name, self._names.advertised(name))
+                self._nodes.inspected(name, self._names.advertised(name), now)
             except CallError:
                 return
 

@@ -36,7 +36,7 @@ from rosgraph_launcher.io.processes import StartError, check_host
 from rosgraph_launcher.io.secret import SecretError, check_signature, read_secret
 from rosgraph_launcher.io.this_host import addresses
 from rosgraph_launcher.io.usage import read_sample
-from rosgraph_launcher.launching.options import LauncherOptions
+from rosgraph_launcher.launching.options import LONGEST_TIMEOUT, LauncherOptions
 from rosgraph_launcher.launching.report import ENDING, LauncherReport
 from rosgraph_launcher.launching.restarts import RestartPolicy
 from rosgraph_launcher.launching.supervision import LauncherError
@@ -179,8 +179,8 @@ def read_options() -> LauncherOptions:
     return LauncherOptions(
         mark=launcher_mark(rospy.get_name()),
         run_id=str(rospy.get_param("/run_id", "")),
-        shutdown_timeout=parameters.number("shutdown_timeout", default.shutdown_timeout, low=0.0),
-        sigint_timeout=parameters.number("sigint_timeout", default.sigint_timeout, low=0.0),
+        shutdown_timeout=parameters.number("shutdown_timeout", default.shutdown_timeout, low=0.0, high=LONGEST_TIMEOUT),
+        sigint_timeout=parameters.number("sigint_timeout", default.sigint_timeout, low=0.0, high=LONGEST_TIMEOUT),
         standby=parameters.flag("standby", default.standby),
         standby_others=parameters.whole("standby_others", default.standby_others, low=0),
         policy=RestartPolicy(

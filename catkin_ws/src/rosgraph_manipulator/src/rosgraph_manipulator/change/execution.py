@@ -96,7 +96,7 @@ class Execution:
         self._servers_died: dict[str, bool] = {}  # by function: whether the kept action's server died
         self._follows = False  # whether the reports of the launcher that made the last change arrive
         self._recovers = False  # whether it waits for nodes that the launcher has started again
-        self._owes_restore = False  # whether former values of parameters could not be restored
+        self._owes_restore = False  # whether former values could not be restored, or those left not be handed over
         self._owes_values: dict[str, frozenset[str]] = {}  # by function: died nodes whose parameters are not put back
         launchers.on_reports = self._follow
         if launchers.reports():
@@ -192,7 +192,7 @@ class Execution:
         # An earlier manipulator may have stopped the action's server.
         awaited = self._progress.awaited(goal is not None and goal.is_between_servers)
         wanted = self.system.parameters_of(function, awaited.nodes)
-        held = HeldParameters(function, wanted, self._names.is_up, self._around)
+        held = HeldParameters(function, wanted, awaited.nodes, self._names.is_up, self._around)
         for number, node in enumerate(awaited.nodes):
 
             def is_up() -> bool:
@@ -390,7 +390,7 @@ class Execution:
             return report is not None and report.change == number and report.state != CHANGING
 
         self._around.wait_for_news(is_reported, STATE_TIMEOUT)
-        held = HeldParameters(function, system.all_parameters(), names.is_up, self._around)
+        held = HeldParameters(function, system.all_parameters(), system.nodes, names.is_up, self._around)
         return DriverStart(start, number, names, held)
 
     # -- helpers --------------------------------------------------------------------------------------------------
@@ -410,12 +410,20 @@ class Execution:
             self._overwritten.remember(asked, self._around.parameters(asked))
             values, gone = self._overwritten.transition(wanted, others)
             # Each time, because the call that handed it over before may have failed.
-            handover = {self._around.resolve("~overwritten"): self._overwritten.as_parameter()}
             clear = launch.clear if launch else ()
-            self._around.set_parameters({**handover, **values}, delete=[*clear, *gone])
+            self._around.set_parameters({**self._handover(), **values}, delete=[*clear, *gone])
             self._owes_restore = False
         except (CallError, OSError) as error:
             raise DeploymentError(" ".join(str(error).split())) from error
+        if self._overwritten.restored(wanted, others):
+            try:
+                self._around.set_parameters(self._handover())
+            except (CallError, OSError):
+                self._owes_restore = True  # `catch_up` hands it over
+
+    def _handover(self) -> dict[str, Any]:
+        """Return the parameter that tells the next manipulator which former values are to be restored."""
+        return {self._around.resolve("~overwritten"): self._overwritten.as_parameter()}
 
     def _put_back(self, function: str, nodes: frozenset[str]) -> None:
         """Set those parameters of nodes that somebody has changed.

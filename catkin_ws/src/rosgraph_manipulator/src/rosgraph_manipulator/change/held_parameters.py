@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any
 
 from node_kit.io.xml_rpc import CallError
+from rosgraph_launcher.description import owner_of
 
 from rosgraph_manipulator.change.surroundings import Surroundings
 from rosgraph_manipulator.configuration.difference import same_value
@@ -31,17 +32,25 @@ class HeldParameters:
     """
 
     def __init__(
-        self, function: str, wanted: Mapping[str, Any], is_up: Callable[[str], bool], around: Surroundings
+        self,
+        function: str,
+        wanted: Mapping[str, Any],
+        nodes: Iterable[str],
+        is_up: Callable[[str], bool],
+        around: Surroundings,
     ) -> None:
         """Begin to look.
 
         Args:
             function: that the nodes are started for.
             wanted: the values that they are to read, by full name.
+            nodes: all of them.
             is_up: tells whether a node is up.
             around: the clock and the master.
         """
-        self._function, self._wanted, self._is_up, self._around = function, wanted, is_up, around
+        self._function, self._is_up, self._around = function, is_up, around
+        names = tuple(nodes)
+        self._wanted = {name: (owner_of(name, names), value) for name, value in wanted.items()}
         self._next = around.now()
 
     def look(self, nodes: Collection[str]) -> None:
@@ -62,8 +71,8 @@ class HeldParameters:
         self._next = end + max(_PERIOD, (end - begin) / _SHARE)
 
     def _of(self, nodes: Iterable[str]) -> dict[str, Any]:
-        begins = tuple(f"{node}/" for node in nodes)
-        return {name: value for name, value in self._wanted.items() if name.startswith(begins)}
+        meant = set(nodes)
+        return {name: value for name, (owner, value) in self._wanted.items() if owner in meant}
 
     def _still_read(self, lost: Mapping[str, Any], nodes: Collection[str]) -> dict[str, Any]:
         left = self._of(node for node in nodes if not self._is_up(node))

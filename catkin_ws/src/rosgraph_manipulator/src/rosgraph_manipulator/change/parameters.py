@@ -58,6 +58,22 @@ class OverwrittenParameters:
         restored = {name: value for name, value in self._before.items() if name not in kept}
         return {**restored, **wanted}, sorted(self._absent - kept)
 
+    def restored(self, wanted: Iterable[str], others: Iterable[str] = ()) -> bool:
+        """Forget the former values that `transition` has had restored: others may set these parameters from now on.
+
+        Args:
+            wanted: names of the parameters of the configuration that was deployed.
+            others: names of the parameters of other functions.
+
+        Returns:
+            Whether there were any.
+        """
+        kept = {*wanted, *others}
+        gone = {*self._before, *self._absent} - kept
+        self._before = {name: value for name, value in self._before.items() if name in kept}
+        self._absent &= kept
+        return bool(gone)
+
     def as_parameter(self) -> dict[str, list[Any]]:
         """Return the value of the parameter that hands this over to the next manipulator."""
         return {"before": [[name, value] for name, value in self._before.items()], "absent": sorted(self._absent)}

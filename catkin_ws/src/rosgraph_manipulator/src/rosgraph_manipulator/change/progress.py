@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 
-from rosgraph_launcher.description import NodeDescription, SystemDescription
+from rosgraph_launcher.description import NodeDescription, SystemDescription, owner_of
 from rosgraph_launcher.launching.report import CHANGING, FAILED, RECOVERING, STABLE, LauncherReport
 
 from rosgraph_manipulator.configuration.configurations import Configuration
@@ -238,7 +238,7 @@ class ChangeProgress:
 
     def parameters_change(self, server: str) -> None:
         """Note that parameters are being set at a dynamic_reconfigure server: its node may soon have a mixture."""
-        self._uncertain |= {name for name in self.launched if f"{server}/".startswith(f"{name}/")}
+        self._uncertain |= {owner_of(f"{server}/", self.launched)} - {""}
 
     def running(self, function: str) -> str:
         """Return the name of the configuration that runs for a function; empty where none does."""

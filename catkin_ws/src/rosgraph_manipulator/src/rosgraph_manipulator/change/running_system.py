@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from node_kit.io.xml_rpc import CallError
-from rosgraph_launcher.description import NodeDescription, SystemDescription
+from rosgraph_launcher.description import NodeDescription, SystemDescription, owner_of
 
 from rosgraph_manipulator.change.deployment import DeploymentError
 from rosgraph_manipulator.change.parameters import put_back
@@ -211,7 +211,7 @@ class RunningSystem:
         system = self._runs(function)
         values = {}
         for node in system.nodes:
-            own = {n: value for n, value in drifted.items() if n.startswith(f"{node}/") and value is not None}
+            own = {n: v for n, v in drifted.items() if v is not None and owner_of(n, system.nodes) == node}
             adjustable = self.nodes.adjustable(node) if own else {}
             values.update({name: value for name, value in own.items() if name.removeprefix(f"{node}/") in adjustable})
         if not values:

@@ -6,6 +6,7 @@ A client sees one goal from the beginning to the end, whichever server pursues i
 from __future__ import annotations
 
 import enum
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from actionlib_msgs.msg import GoalStatus
@@ -20,6 +21,35 @@ class Ending(enum.Enum):
     SUCCEEDED = "succeeded"
     ABORTED = "aborted"
     CANCELLED = "cancelled"
+
+
+class ServedFunctions:
+    """The functions whose changes concern the server behind a relay.
+
+    That is the function that the relay was given. Without one, they are those whose nodes served the action last, as
+    far as the launchers tell. Where nobody has said so yet, each function may be meant.
+    """
+
+    def __init__(self, given: str = "") -> None:
+        """Begin with the function that the relay was given; empty: none."""
+        self._known = frozenset({given} - {""})
+        self._is_given = bool(given)
+        self._launched: Mapping[str, Mapping[str, frozenset[str]]] = {}
+
+    def launched(self, launcher: str, nodes: Mapping[str, Collection[str]]) -> None:
+        """Note which nodes a launcher has for each function."""
+        self._launched = {**self._launched, launcher: {name: frozenset(own) for name, own in nodes.items()}}
+
+    def served_by(self, nodes: Collection[str]) -> None:
+        """Note which nodes serve the action now."""
+        if self._is_given:
+            return
+        functions = [item for launched in self._launched.values() for item in launched.items()]
+        self._known = frozenset(name for name, own in functions if not own.isdisjoint(nodes)) or self._known
+
+    def concern(self, functions: Collection[str]) -> bool:
+        """Tell whether one of these functions is meant."""
+        return not self._known.isdisjoint(functions) if self._known else bool(functions)
 
 
 @dataclass

@@ -15,6 +15,8 @@ from ros_model.io.files import resolve
 from rosgraph_manipulator.configuration.configurations import ConfigurationError, ManipulatorOptions, parse_options
 from rosgraph_manipulator.configuration.repairs import parse_repairs
 
+_SCHEME = "package://"
+
 
 def options_from(parameters: Mapping[str, Any]) -> ManipulatorOptions:
     """Check the manipulator's parameters, and find the launch files that they name.
@@ -32,7 +34,7 @@ def find_launch_file(uri: str, anywhere: bool) -> str:
 
     Args:
         uri: its path or `package://PKG/PATH`.
-        anywhere: where it is not there, search its whole package, as roslaunch does.
+        anywhere: where `package://PKG/launch/FILE` is not there, search the whole package for FILE, as roslaunch does.
 
     Raises:
         ConfigurationError: there is no such file.
@@ -41,8 +43,11 @@ def find_launch_file(uri: str, anywhere: bool) -> str:
         path = resolve(uri)
     except ModelError as error:
         raise ConfigurationError(str(error)) from error
-    if not is_file(path) and anywhere:
-        path = next((found for found in _files_below(path.parents[1]) if found.name == path.name), path)
+    if anywhere and uri.startswith(_SCHEME) and not is_file(path):
+        package, _, file = uri.removeprefix(_SCHEME).partition("/launch/")
+        folder = resolve(f"{_SCHEME}{package}/package.xml").parent
+        parts = Path(file).parts
+        path = next((found for found in _files_below(folder) if found.parts[-len(parts) :] == parts), path)
     if not is_file(path):
         raise ConfigurationError(f"there is no launch file {path}: correct the name, or generate it")
     return str(path)

@@ -27,7 +27,7 @@ from ros_model.io.launch_loader import (
 from ros_model.io.models import read_system
 from ros_model.io.project import load_project
 from ros_model.project.settings import FILE_NAME
-from rosgraph_launcher.description import NodeDescription, SystemDescription
+from rosgraph_launcher.description import NodeDescription, SystemDescription, owner_of
 from rosgraph_launcher.io.command_lines import EXPLAINED, reason
 
 from rosgraph_manipulator.change.deployment import DeploymentError
@@ -206,7 +206,7 @@ class _Loader(LaunchLoader):
         if context is not None:
             context.resolve_dict["anon"] = _StableNames()
 
-    def resolve_args(self, args: str, context: Any) -> Any:
+    def resolve_args(self, args: str | None, context: Any) -> Any:
         """Return an attribute with its `$(...)` replaced.
 
         Raises:
@@ -218,7 +218,7 @@ class _Loader(LaunchLoader):
         except (*_EXPLAINED, RecursionError):  # the latter comes of a file that includes itself
             raise
         except (Exception, SystemExit) as error:
-            what = f"'{shortened(args)}' fails: {type(error).__name__}: {' '.join(str(error).split())}"
+            what = f"'{shortened(args or '')}' fails: {type(error).__name__}: {' '.join(str(error).split())}"
             raise LaunchFileError(f"{context.filename}: {what}: correct the expression") from error
 
 
@@ -233,14 +233,15 @@ def _checked(path: str | Path, config: Any) -> LaunchFile:
     if not config.nodes:
         raise LaunchFileError(f"{path}: starts no node")
     nodes = {}
-    left = {key: parameter.value for key, parameter in config.params.items()}
-    for node in config.nodes:
-        name = rosgraph.names.ns_join(node.namespace, node.name)
-        private = {key: left.pop(key) for key in list(left) if key.startswith(f"{name}/")}
-        parameters = {key.removeprefix(f"{name}/"): value for key, value in private.items()}
-        nodes[name] = _description(name, node, parameters)
+    names = [rosgraph.names.ns_join(node.namespace, node.name) for node in config.nodes]
+    private: dict[str, dict[str, Any]] = {}
+    for key, parameter in config.params.items():
+        owner = owner_of(key, names)
+        private.setdefault(owner, {})[key.removeprefix(f"{owner}/") if owner else key] = parameter.value
+    for name, node in zip(names, config.nodes, strict=True):
+        nodes[name] = _description(name, node, private.get(name, {}))
     return LaunchFile(
-        SystemDescription(nodes, left),
+        SystemDescription(nodes, private.get("", {})),
         clear=tuple(config.clear_params),
         commands=tuple((str(e.command), *map(str, e.args)) for e in config.executables),
         remarks=tuple(dict.fromkeys(_ignored(node.machine) for node in config.nodes if _ignored(node.machine))),

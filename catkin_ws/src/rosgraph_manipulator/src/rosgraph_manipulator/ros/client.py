@@ -32,7 +32,7 @@ from node_kit.ros.action_server import wait_for_server
 from rosgraph_launcher.io.master import NodeApi
 
 from rosgraph_manipulator.change.journal import parse_journal
-from rosgraph_manipulator.configuration.configurations import DEFAULT_FUNCTION, KEYS
+from rosgraph_manipulator.configuration.configurations import DEFAULT_FUNCTION, KEYS, ManipulatorOptions
 from rosgraph_manipulator.io.master import publishers
 from rosgraph_manipulator.ros.launcher_reports import TOPIC
 from rosgraph_manipulator.ros.requests import CHANGE_FUNCTION
@@ -91,7 +91,12 @@ def join_or_refuse(name: str) -> None:
 
 def manipulator_parameters() -> dict[str, Any]:
     """Return the running manipulator's parameters; None stands for those that are not set."""
-    return {key: rospy.get_param(f"{NODE}/{key}", rospy.get_param(key, None)) for key in KEYS}
+    return {key: _parameter(key) for key in KEYS}
+
+
+def _parameter(key: str) -> Any:
+    """Return a parameter of the manipulator, which may be private or one of its namespace; None: it is not set."""
+    return rospy.get_param(f"{NODE}/{key}", rospy.get_param(key, None))
 
 
 def request(configuration: str, restart: Sequence[str] = ()) -> Answer:
@@ -105,8 +110,8 @@ def request(configuration: str, restart: Sequence[str] = ()) -> Answer:
         ClientError: no manipulator answers, or nobody knows the function of the configuration.
     """
     if not restart:
-        action = rospy.get_param(f"{NODE}/reconfiguration_action_name", "rosgraph_manipulator_action_server")
-        return _ask(action, MvpReconfigurationAction, MvpReconfigurationGoal(configuration))
+        action = _parameter("reconfiguration_action_name") or ManipulatorOptions.reconfiguration_action_name
+        return _ask(str(action), MvpReconfigurationAction, MvpReconfigurationGoal(configuration))
     known = manipulator_parameters()["configurations"] or {}
     if configuration not in known:
         raise ClientError(f"unknown configuration '{configuration}'; known are: {', '.join(sorted(known))}")

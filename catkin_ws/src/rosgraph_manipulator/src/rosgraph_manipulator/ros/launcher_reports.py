@@ -46,6 +46,8 @@ class _Known:
         pid: of its process, as it says itself; None: nobody has asked.
         uri: address of its API; None: unknown.
         lost: whether its host is lost.
+        connection: header of the connection over which it reports; None: it has not reported yet.
+        is_read: whether place and host are those of the process that runs now.
     """
 
     place: HostLauncher
@@ -55,6 +57,8 @@ class _Known:
     pid: int | None = None
     uri: str | None = None
     lost: bool = False
+    connection: object = None
+    is_read: bool = False
 
 
 class LauncherReports:
@@ -178,7 +182,8 @@ class LauncherReports:
     # -- the hosts ------------------------------------------------------------------------------------------------
 
     def _take(self, message: LaunchedFunctions) -> None:
-        name = message._connection_header["callerid"]
+        connection = message._connection_header
+        name = connection["callerid"]
         try:
             reports = {function.function: report_from(function) for function in message.functions}
         except ValueError as error:
@@ -186,34 +191,40 @@ class LauncherReports:
             return
         with self._lock:
             known = self._known.get(name) or self._strangers.get(name)
-            is_new = known is None
             if known is None:
                 known = self._strangers[name] = _Known(HostLauncher(name), is_here=True)
+            is_new = known.connection is not connection  # it may be another process, on another host
+            if is_new:
+                known.connection, known.uri, known.is_read = connection, None, False
             known.reports = reports
             self._heard(known)
-        if is_new and not self._admit(name):
-            rospy.logwarn("reports of %s are left out until it has set %s/addresses, as each launcher does", name, name)
+        if is_new:
+            self._read(name)
         with self._lock:
             is_launcher = name in self._known
         if is_launcher:
             self.on_reports()
+        elif is_new:
+            rospy.logwarn("reports of %s are left out until it has set %s/addresses, as each launcher does", name, name)
 
-    def _admit(self, name: str) -> bool:
-        """Count a stranger among the launchers if it is one; tell whether it is.
+    def _read(self, name: str) -> bool:
+        """Read where a launcher runs, and count a stranger among the launchers if it is one; tell whether that is news.
 
-        A launcher sets the parameter that says where it runs before it reports. The main one counts in any case.
+        A launcher sets the parameter that says where it runs before it reports. The main one counts in any case. Where
+        the master does not answer, what was known stays until the next look.
         """
-        addresses = _addresses_of(name)
-        if addresses is None and name != self._main:
-            return False
-        place = HostLauncher(name, addresses or ())
-        is_here = _is_here(place)
+        addresses, is_here = _addresses_of(name), _is_here(name)
         with self._lock:
-            known = self._strangers.pop(name, None)
-            if known:
-                known.place, known.is_here = place, is_here
-                self._known[name] = known
-        return True
+            known = self._known.get(name) or self._strangers.get(name)
+            if known is None or (addresses is None and (name in self._known or name != self._main)):
+                return False
+            before = known.place, known.is_here
+            known.place = HostLauncher(name, addresses or ())
+            known.is_here = known.is_here if is_here is None else is_here
+            known.is_read = addresses is not None and is_here is not None
+            is_stranger = self._strangers.pop(name, None) is not None
+            self._known[name] = known
+            return is_stranger or before != (known.place, known.is_here)
 
     def _heard(self, known: _Known) -> None:
         known.answered = time.monotonic()
@@ -241,7 +252,7 @@ class LauncherReports:
             self._look_around()
 
     def _look_around(self) -> None:
-        """Ask the launchers whether they are there, and the master whether strangers are launchers.
+        """Ask the launchers whether they are there, and the master where they run and whether strangers are launchers.
 
         The main one on this host is not asked: its end shows at once by its closed connection.
         """
@@ -249,17 +260,20 @@ class LauncherReports:
             asked = [known for name, known in self._known.items() if name != self._main or not known.is_here]
         for known in asked:
             self._look(known)
-        self._look_at_strangers()
+        self._look_at_unread()
 
-    def _look_at_strangers(self) -> None:
-        """Ask again whether they are launchers, since the master may not have answered; forget those that are gone."""
+    def _look_at_unread(self) -> None:
+        """Ask again where launchers run that were started anew, and whether strangers are launchers.
+
+        The master may not have answered before. Strangers that are gone are forgotten.
+        """
         connected, now = self._connected(), time.monotonic()
         with self._lock:
             for name, stranger in list(self._strangers.items()):
                 if name not in connected and now - stranger.answered > self._host_timeout:
                     del self._strangers[name]
-            names = list(self._strangers)
-        if [name for name in names if self._admit(name)]:
+            names = [*self._strangers, *(name for name, known in self._known.items() if not known.is_read)]
+        if [name for name in names if self._read(name)]:
             self.on_reports()
 
     def _look(self, known: _Known) -> None:
@@ -270,8 +284,10 @@ class LauncherReports:
         with self._lock:
             was_lost = known.lost
             if pid is not None:
-                if was_lost and known.pid not in (None, pid):
-                    known.reports = {}  # it is another process, which tells what it has as soon as it is connected
+                if known.pid not in (None, pid):  # it is another process
+                    known.is_read = False
+                    if was_lost:
+                        known.reports = {}  # it tells what it has as soon as it is connected
                 known.pid = pid
                 self._heard(known)
             elif time.monotonic() - known.answered > self._host_timeout:
@@ -297,6 +313,7 @@ def _addresses_of(name: str) -> tuple[str, ...] | None:
     return tuple(map(str, addresses)) if isinstance(addresses, list) else None
 
 
-def _is_here(place: HostLauncher) -> bool:
-    uri = NodeApi.address(place.name)
-    return uri is None or is_this_host(rosgraph.network.parse_http_host_and_port(uri)[0])
+def _is_here(name: str) -> bool | None:
+    """Return whether a launcher runs on this host; None: nothing is known."""
+    uri = NodeApi.address(name)
+    return None if uri is None else is_this_host(rosgraph.network.parse_http_host_and_port(uri)[0])

@@ -33,13 +33,11 @@ from rosgraph_manipulator.change.deployment import DeploymentError
 from rosgraph_manipulator.hosts.merging import stale
 from rosgraph_manipulator.hosts.splitting import Part, split
 from rosgraph_manipulator.ros.launcher_reports import ASKING, REPEAT_PERIOD, WATCH_PERIOD, LauncherReports
+from rosgraph_manipulator.ros.service_failures import SERVICE_FAILURES
 
 _NOT_REACHED = (TransportInitError, rosgraph.MasterError, NoThreadError)
 """How a request fails that was not sent: what rospy has caught when it raises a ServiceException (no registration, no
 connection), and no thread that asks."""
-
-_FAILURES = (rospy.ServiceException, rospy.ROSException, TransportException, OSError)
-"""What a call of a launcher's service raises."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +63,7 @@ class Launchers(LauncherReports):
             return False, ""
         try:
             answer = self._wait_for(name, lambda: rospy.ServiceProxy(f"{name}/check", CheckNodes)([node.name]))
-        except (DeploymentError, *_FAILURES):
+        except (DeploymentError, *SERVICE_FAILURES):
             return False, ""
         return answer.up[0], answer.conflicts[0]
 
@@ -132,7 +130,7 @@ class Launchers(LauncherReports):
 
     def _tell_expected(self, name: str, nodes: Sequence[NodeDescription]) -> None:
         service = rospy.ServiceProxy(f"{name}/stand_by", StandBy)
-        with contextlib.suppress(*_FAILURES, SecretError):
+        with contextlib.suppress(*SERVICE_FAILURES, SecretError):
             service.wait_for_service(self._timeout)
             request = StandByRequest([to_message(node) for node in nodes], "")
             sign(request, name)
@@ -212,7 +210,7 @@ class Launchers(LauncherReports):
                     failures.append(answer.message if len(parts) == 1 else f"{self._host(name)}: {answer.message}")
             except (DeploymentError, NoThreadError) as error:
                 failures.append(str(error))
-            except _FAILURES as error:
+            except SERVICE_FAILURES as error:
                 failures.append(f"{name.rpartition('/')[2]} has failed ({error}): check that it runs")
         if failures:
             raise DeploymentError("; ".join(failures))
@@ -274,7 +272,7 @@ class Launchers(LauncherReports):
             rospy.ServiceProxy(f"{name}/check", CheckNodes)([])
             # After the check, which a successor may have answered: it registers this service before that one.
             return bool(rosgraph.Master(rospy.get_name()).lookupService(f"{name}/change") == uri)
-        except (*_FAILURES, rosgraph.MasterException):
+        except (*SERVICE_FAILURES, rosgraph.MasterException):
             return False
 
     def _wait_for(self, name: str, work: Callable[[], Any]) -> Any:

@@ -18,6 +18,7 @@ from node_kit.parameters import ParameterError, ParameterTree
 from node_kit.plugins import PluginError
 from node_kit.ros.lifetime import Lifetime
 from node_kit.ros.parts import watch_parts
+from rosgraph_launcher.launching.options import LONGEST_TIMEOUT
 
 from rosgraph_manipulator.change.execution import Execution
 from rosgraph_manipulator.change.journal import Journal, begin_journal, parse_journal
@@ -98,7 +99,7 @@ class Manipulator:
         self._inbox = Inbox()
         probation = parameters.number("probation", 5.0, low=0.0)
         announcer = Announcer()
-        launcher_timeout = parameters.number("launcher_timeout", 10.0)
+        launcher_timeout = parameters.number("launcher_timeout", 10.0, high=LONGEST_TIMEOUT)
         launchers = Launchers(launcher_timeout, parameters.number("host_timeout", 3.0, low=0.1))
         if not launchers.find():
             rospy.logwarn("rosgraph_launcher is not there; start it beside this node: nothing can be deployed without")

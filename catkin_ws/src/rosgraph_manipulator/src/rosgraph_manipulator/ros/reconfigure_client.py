@@ -18,7 +18,7 @@ from dynamic_reconfigure.msg import (
     StrParameter,
 )
 from dynamic_reconfigure.srv import Reconfigure
-from node_kit.io.background import NoThreadError, in_background
+from node_kit.io.background import in_background
 from node_kit.io.xml_rpc import CallError
 from rosgraph_launcher.io.master import NodeApi
 
@@ -26,6 +26,7 @@ from rosgraph_manipulator.change.deployment import DeploymentError
 from rosgraph_manipulator.change.tactics import Adjustable
 from rosgraph_manipulator.configuration.difference import same_value
 from rosgraph_manipulator.io.master import services_of
+from rosgraph_manipulator.ros.service_failures import SERVICE_FAILURES
 
 DESCRIPTION_TIMEOUT = 1.0  # s, wall, for all servers of a node to describe themselves
 SET_TIMEOUT = 1.0  # s, wall, for a server to take values
@@ -65,7 +66,7 @@ class ReconfigureClient:
             answer = future.result(SET_TIMEOUT)
         except TimeoutError as error:
             raise DeploymentError(f"{server} does not answer within {SET_TIMEOUT:g} s") from error
-        except (rospy.ServiceException, rospy.ROSException, NoThreadError) as error:
+        except SERVICE_FAILURES as error:
             raise DeploymentError(f"{server} does not take the parameters: {error}") from error
         taken = _values(answer.config)
         for name, value in values.items():

@@ -8,7 +8,7 @@ from typing import Any
 import actionlib
 import roslib.message
 import rospy
-from metacontrol_msgs.msg import ActiveConfiguration, FunctionGrounding
+from metacontrol_msgs.msg import ActiveConfiguration, FunctionGrounding, LaunchedFunctions
 from node_kit.io.inbox import Inbox
 from node_kit.ros.action_server import is_connected
 from node_kit.ros.connections import latest
@@ -16,9 +16,10 @@ from node_kit.ros.lifetime import Lifetime
 
 from rosgraph_manipulator.configuration.configurations import ConfigurationError, action_type
 from rosgraph_manipulator.goals.clients import Client
-from rosgraph_manipulator.goals.relay import Ending, Link
+from rosgraph_manipulator.goals.relay import Ending, Link, ServedFunctions
 from rosgraph_manipulator.ros.action_server import ActionServer
 from rosgraph_manipulator.ros.goal_clients import GoalClients
+from rosgraph_manipulator.ros.launcher_reports import TOPIC as LAUNCHED
 
 PERIOD = 0.05  # s, wall, between two looks at whether goals can be sent
 BUSY = (FunctionGrounding.RECONFIGURING, FunctionGrounding.RECOVERING)
@@ -41,16 +42,25 @@ class Relay:
     thread that spins does it, without a lock.
     """
 
-    def __init__(self, action: str, server: str, kind: Any) -> None:
-        """Begin to offer the action `action`, whose goals the action `server` pursues; `kind` is the type of both."""
+    def __init__(self, action: str, server: str, kind: Any, function: str = "") -> None:
+        """Begin to offer an action.
+
+        Args:
+            action: its name.
+            server: name of the action that pursues its goals.
+            kind: type of both.
+            function: the function whose nodes serve that action; empty: those that the launchers tell.
+        """
         self._goals: dict[str, _Goal] = {}
         self._inbox = Inbox()
-        self._changing = False
+        self._busy: frozenset[str] = frozenset()  # the functions that change or recover
+        self._served = ServedFunctions(function)
         self._client = actionlib.ActionClient(server, kind)
         self._server = ActionServer(action, kind, self._on_goal, self._on_cancel, auto_start=False)
         rospy.Subscriber(
             "rosgraph_manipulator/active_configuration", ActiveConfiguration, latest(self._on_configuration)
         )
+        rospy.Subscriber(LAUNCHED, LaunchedFunctions, latest(self._on_launched), queue_size=20)
         self._waits = GoalClients(action, server)
         self._waiting: dict[str, Client | None] = {}  # who waits for each goal
         self._subscriber = rospy.Subscriber(f"{action}/goal", type(kind().action_goal), self._on_goal_message)
@@ -64,7 +74,14 @@ class Relay:
             self._inbox.drain(wait_s=PERIOD)
             self._send_goals()
 
+    @property
+    def _changing(self) -> bool:
+        """Whether a function changes or recovers whose nodes serve the action behind, as far as is known."""
+        return self._served.concern(self._busy)
+
     def _send_goals(self) -> None:
+        if status := self._client.last_status_msg:
+            self._served.served_by({status._connection_header["callerid"]})
         if not any(goal.link.needs_sending(self._changing) for goal in self._goals.values()):
             return
         if not is_connected(self._client):
@@ -137,7 +154,11 @@ class Relay:
         finish(result, text)
 
     def _on_configuration(self, active: ActiveConfiguration) -> None:
-        self._changing = any(grounding.state in BUSY for grounding in active.functions)
+        self._busy = frozenset(grounding.function for grounding in active.functions if grounding.state in BUSY)
+
+    def _on_launched(self, message: LaunchedFunctions) -> None:
+        nodes = {function.function: function.nodes for function in message.functions}
+        self._served.launched(message._connection_header["callerid"], nodes)
 
 
 def main() -> None:
@@ -151,4 +172,7 @@ def main() -> None:
         message_class = roslib.message.get_message_class(kind)
         if message_class is None:
             raise ConfigurationError(f"parameter '~type': message type {kind} is not installed")
-        Relay(names[0], names[1], message_class).spin()
+        function = rospy.get_param("~function", "")
+        if not isinstance(function, str):
+            raise ConfigurationError(f"parameter '~function' is {function!r}: it must be the name of a function")
+        Relay(names[0], names[1], message_class, function).spin()

@@ -35,6 +35,7 @@ from rosgraph_manipulator.change.repairs import (
 )
 from rosgraph_manipulator.configuration.configurations import Configuration, ManipulatorOptions, Repair
 from rosgraph_manipulator.ros.action_server import ActionServer
+from rosgraph_manipulator.ros.service_failures import SERVICE_FAILURES
 
 ACTION = "rosgraph_manipulator/repair"
 
@@ -91,7 +92,7 @@ class RepairServer:
                 self._start_now(driver)
                 rospy.logwarn("%s: started again, because the launcher has ended", driver.name)
                 self._told.pop(driver.name, None)
-            except (DeploymentError, rospy.ROSException, OSError) as error:
+            except (DeploymentError, *SERVICE_FAILURES) as error:
                 if self._told.get(driver.name) != _line(error):
                     self._told[driver.name] = _line(error)
                     rospy.logerr("%s: %s; it is tried again", driver.name, _line(error))
@@ -129,7 +130,7 @@ class RepairServer:
             outcome = self._start(run, run.repair.driver) if run.repair.driver else self._call(run)
         except _CancelledError:
             rospy.loginfo("the repair of %s is cancelled", run.repair.component)
-        except (DeploymentError, ROSServiceException, rospy.ServiceException, NoThreadError) as error:
+        except (DeploymentError, ROSServiceException, *SERVICE_FAILURES) as error:
             outcome = RepairOutcome(False, _line(error))
         except Exception as error:  # nobody would hear of it in this thread
             outcome = RepairOutcome(False, f"{type(error).__name__}: {_line(error)}")

@@ -22,6 +22,7 @@ from rosgraph_manipulator.configuration.configurations import Configuration
 from rosgraph_manipulator.io import foreign_nodes
 from rosgraph_manipulator.io.launch_files import LaunchFile, read_configuration
 from rosgraph_manipulator.io.master import get_parameters, publishers, set_parameters
+from rosgraph_manipulator.ros.service_failures import SERVICE_FAILURES
 
 COMMAND_TIMEOUT = 5.0  # s, wall, for a `rosparam` call of a launch file
 ASK_THREADS = 8  # nodes are asked side by side whether they hang
@@ -53,7 +54,7 @@ class RosLog:
 class RosSurroundings:
     """The `Surroundings` of a manipulator on ROS."""
 
-    failures: tuple[type[Exception], ...] = (rospy.ROSException, OSError)
+    failures: tuple[type[Exception], ...] = SERVICE_FAILURES
 
     def __init__(self) -> None:
         self.log = RosLog()
