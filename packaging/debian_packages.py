@@ -33,11 +33,11 @@ PYTHON_PACKAGE = "mros-python"
 
 NEEDED_PROGRAMS = {
     "mros1_reasoner": ["openjdk-17-jre-headless"],  # Pellet
-    "ros_model": ["graphviz"],  # drawings
+    "ros_model": ["graphviz", "python3-simpleeval"],  # drawings; expressions of launch files
     "rosgraph_monitor": ["libdiagnostic-aggregator-tools"],  # the aggregator that its launch file starts
     "metacontrol_sim": ["python3-rosmaster"],
 }
-"""Debian packages that no package.xml can name, by our package: programs, and what roslaunch starts."""
+"""Debian packages that are not found by package.xml: programs, what roslaunch starts, and Python packages of Debian."""
 
 TOOLS = [
     "catkin",

@@ -7,7 +7,7 @@ import pytest
 from ros_model.checks.systems import check_system
 from ros_model.errors import ModelError
 from ros_model.generators.launch import launch_file
-from ros_model.language.metamodel import Reference
+from ros_model.language.metamodel import Reference, compose
 from ros_model.language.system_reader import parse_system
 
 TALK = """RosSystem { Name talk RosComponents (
@@ -159,3 +159,35 @@ def test_generate_says_of_a_value_what_check_says(inside):
 def test_value_of_its_type_is_no_fault_and_can_be_launched(inside):
     assert found(parameter(inside)) == []
     assert "qa" in launch_file(parse_system(parameter(inside).replace("name p", "name qa")))
+
+
+CAMERAS = """RosSystem { Name x RosComponents (
+    ComponentInterface { name camera NameSpace left FromRosNode 'p.c.c'
+        RosPublishers { RosPublisher image { RefPublisher 'p.c.c.image' } } }
+    ComponentInterface { name camera NameSpace right FromRosNode 'p.c.c'
+        RosPublishers { RosPublisher image { RefPublisher 'p.c.c.image' } } }
+    ComponentInterface { name view FromRosNode 'p.v.v'
+        RosSubscribers { RosSubscriber in { RefSubscriber 'p.v.v.in' } } } )
+    TopicConnections { TopicConnection 'left/image' { From ( 'camera.image' ) To ( 'view.in' ) } } }"""
+
+
+def test_connection_to_one_of_two_components_of_a_name_is_refused_with_the_remedy():
+    told = "m:8:62: error: 'camera' is left/camera and right/camera: name each component by its whole name"
+    (finding,) = (finding for finding in found(CAMERAS) if "whole name" in finding)
+    assert finding == f"{told}, such as 'left/camera'"
+    with pytest.raises(ModelError, match="name each component by its whole name"):
+        launch_file(parse_system(CAMERAS, "m"))
+
+
+def test_whole_names_tell_components_apart_and_so_do_none_where_nothing_is_connected():
+    whole = CAMERAS.replace("name camera NameSpace left", "name 'left/camera'").replace("'camera.", "'left/camera.")
+    alone = re.sub(r"TopicConnections.*", "}", CAMERAS, flags=re.DOTALL)
+    assert not [finding for text in (whole, alone) for finding in found(text) if "whole name" in finding]
+    assert "error" not in "".join(found(whole))
+
+
+def test_variant_replaces_the_component_of_its_namespace_only():
+    base = parse_system(re.sub(r"TopicConnections.*", "}", CAMERAS, flags=re.DOTALL), "m")
+    variant = replace(base, name="v", components=base.components[1:2], connections=())
+    names = [component.graph_name for component in compose(base, variant).components]
+    assert sorted(names) == ["left/camera", "right/camera", "view"]

@@ -5,9 +5,13 @@ import math
 import time
 
 import pytest
+import rosparam  # noqa: F401 - teaches PyYAML angles
+import yaml
 from node_kit.yaml_text import MAX_VALUES
 from ros_model.errors import ModelError
 from ros_model.io.launch_files import NotRun, load, wrong_parameters
+from ros_model.io.launch_loader import MAX_FILES
+from roslaunch.substitution_args import resolve_args
 
 LEVELS = "abcdefg"
 BOMB = "a: &a [1,1,1,1,1,1,1,1,1,1]\n" + "\n".join(
@@ -188,3 +192,129 @@ def test_what_roslaunch_only_warns_of_is_refused_as_such(refusal, body, words):
 def test_whatever_roslaunch_raises_is_told_with_element_and_remedy(refusal, body, words):
     told = refusal(body)
     assert told.startswith(words) and told.endswith(": correct the launch file")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "open('MARK', 'w')",
+        "().x.y.join([open('MARK', 'w')])",
+        "[f for f in [str]][0].mro()",
+        "'{0.real}'.format(1)",
+        "f'{1:9999999999d}'",
+        "9**9**9",
+        "'a'*9999999999",
+        "'%9999999999d' % 1",
+        "'a'.zfill(9999999999)",
+        "factorial(99999999)",
+        "(lambda: 1)()",
+        "1" + "+1" * 1500,
+        "1" + " " * 5000,
+    ],
+)
+def test_expression_that_asks_for_python_is_refused_and_not_run(refusal, tmp_path, text):
+    mark = tmp_path / "mark"
+    told = refusal(f'<param name="p" value="$(eval {text.replace("MARK", str(mark))})"/>')
+    assert '<param name="p" value="$(eval ' in told and ": " in told
+    assert not mark.exists()
+
+
+def test_expression_is_computed_as_roslaunch_does(tmp_path, monkeypatch):
+    monkeypatch.setenv("ROBOT", "left arm")
+    expressions = [
+        *(
+            "a + 1",
+            "arg('a') * 2.5",
+            "word",
+            "word == 'b c'",
+            "not flag and a > 2",
+            "'x' if flag else 'y'",
+            "1 < a <= 3",
+        ),
+        *("word.split()[1]", "'-'.join(word.split())", "word.replace('b', 'd').upper()", "env('ROBOT') + '!'"),
+        *("word.startswith('b')", "optenv('NO_ROBOT', 'none')", "optenv('NO_ROBOT')", "sin(pi / 2) + e", "len(word)"),
+        *("list(map(int, '1 2'.split()))", "[1, 'a', 2.0][-1]", "{'k': a}['k']", "dict(k=1)", "dirname() + '/x'"),
+        *(
+            "find('roslaunch') + '/y'",
+            "anon('n') == anon('n')",
+            "'%03d_%s' % (a, word)",
+            "f'{a}{word}'",
+            "float('1e3')",
+        ),
+        *("str(a) + '.5'", "a % 2 == 1", "a // 2", "2 ** 10", "-a", "true", "False", "None", "a in [1, 3]", "word[1:]"),
+        *("[x * 2 for x in [1, 2]]", "(a, word)", "floor(2.7)", "1_0 + 0x10", "max(1, a)", "atan2(1, 1)"),
+    ]
+    path = tmp_path / "robot.launch"
+    arguments = {"a": "3", "word": "b c", "flag": "true", "pi": "4"}
+    context = {"arg": arguments, "anon": {}, "filename": str(path)}
+    given = "".join(f'<arg name="{name}" default="{value}"/>' for name, value in arguments.items())
+    body = "".join(
+        f'<param name="p{n}" type="str" value="{escaped(f"$(eval {text})")}"/>' for n, text in enumerate(expressions)
+    )
+    path.write_text(f"<launch>{given}{body}</launch>")
+    values = load(path).params
+    for number, text in enumerate(expressions):
+        assert values[f"/p{number}"].value == resolve_args(f"$(eval {text})", context).strip(), text
+
+
+def test_argument_that_is_called_as_a_function_of_python_is_the_argument(read):
+    assert read('<arg name="map" default="hall"/><param name="p" value="$(eval map + \'!\')"/>') == {"/p": "hall!"}
+
+
+@pytest.mark.parametrize("text", ["open('MARK', 'w')", "exit(3)", "9**9**9", "'a'", "1/0", "[1]"])
+@pytest.mark.parametrize(
+    "form", ["<rosparam>{}</rosparam>", '<rosparam>a: 1</rosparam><param name="q" type="yaml" value="{}"/>']
+)
+def test_angle_that_asks_for_python_is_refused_and_not_run(refusal, tmp_path, form, text):
+    mark, file = tmp_path / "mark", tmp_path / "p.yaml"
+    code = text.replace("MARK", str(mark))
+    told = refusal(form.format(escaped(f"{{x: !radians '{code.replace(chr(39), chr(39) * 2)}'}}")))
+    assert "is no angle in radians: " in told and told.endswith(": correct the YAML")
+    file.write_text(f'x: !radians "{code}"')
+    assert "is no angle in radians: " in wrong_parameters(file)
+    assert not mark.exists()
+
+
+def test_angles_are_computed_as_rosparam_does(read):
+    angles = "[!radians 2*pi, rad(pi/2), rad(1.5), !degrees 180, deg(-90.5), !radians -pi+1, rad( 1 ), radish]"
+    values = read(f"<rosparam>a: {angles}</rosparam>")["/a"]
+    assert values == yaml.safe_load(angles)
+    assert values[:4] == [2 * math.pi, math.pi / 2, 1.5, math.pi]
+
+
+@pytest.mark.parametrize("number", ["1:" * 5000 + "1", "1" * 5000, "1" * 5000 + ".5"])
+def test_number_of_any_length_is_refused(refusal, number):
+    assert "characters (at most 1100): correct the YAML" in refusal(f"<rosparam>a: {number}</rosparam>")
+
+
+def test_includes_that_double_are_refused(refusal, tmp_path):
+    for number in range(12):
+        include = f'<include file="$(dirname)/l{number + 1}.launch"/>'
+        (tmp_path / f"l{number}.launch").write_text(f"<launch>{include}{include}</launch>")
+    (tmp_path / "l12.launch").write_text("<launch/>")
+    told = refusal(f'<include file="{tmp_path}/l0.launch"/>')
+    assert f"there are more than {MAX_FILES} files with it: include fewer" in told
+
+
+@pytest.mark.parametrize("form", ["$(arg {0})$(arg {0})", "$(eval {0}+{0})"])
+def test_arguments_that_double_are_refused(refusal, form):
+    doubled = "".join(f'<arg name="a{number + 1}" value="{form.format(f"a{number}")}"/>' for number in range(40))
+    told = refusal(f'<arg name="a0" value="xxxxxxxxxx"/>{doubled}')
+    assert "shorten the arguments" in told or "it makes something of the size" in told
+
+
+def test_argument_that_holds_a_substitution_is_refused(refusal):
+    body = (
+        """<arg name="a" value="$(eval '$'+'(arg b)')"/><arg name="b" value="1"/><param name="p" value="$(arg a)"/>"""
+    )
+    assert "the argument a holds '$(': take it out" in refusal(body)
+    assert "more than 1000 $(...)" in refusal(f'<arg name="b" value="1"/><param name="p" value="{"$(arg b)" * 1001}"/>')
+
+
+@pytest.mark.parametrize(
+    "body", ['<arg name="a" value="{}"/>', '<remap from="x" to="{}"/>', '<machine name="x" address="{}"/>']
+)
+def test_refused_expression_is_named_with_file_and_element_whatever_it_stands_in(refusal, body):
+    told = refusal(body.format("$(eval 9**9**9)"))
+    assert told.startswith(f"{body.format('$(eval 9**9**9)')[:-2]}>: $(eval ...): a power with more than 10000 bits")
+    assert told.endswith("use numbers, texts, their methods and roslaunch's functions")

@@ -2,6 +2,9 @@
 
 import os
 import re
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -20,9 +23,11 @@ from ros_model.language.packages import (
     PortDeclaration,
     Spec,
     SpecKind,
+    is_unknown,
 )
 from ros_model.language.packages_reader import parse_packages
 from ros_model.language.packages_writer import write_packages
+from ros_model.project.tables import typed_cell
 
 CORPUS = os.environ.get("MROS_CORPUS")
 
@@ -403,3 +408,41 @@ def test_name_of_a_type_is_written_as_it_was_read(written):
     publisher = f"Publishers {{ Publisher {{ name x message '{written}' }} }}"
     packages = parse_packages(f"PackageSet {{ Package p {{ Artifact a {{ Node {{ name n {publisher} }} }} }} }}")
     assert parse_packages(write_packages(packages)) == packages
+
+
+@pytest.mark.parametrize(
+    ("name", "unknown"),
+    [
+        ("{topic}@src/n.cpp:3", True),
+        ("a/{x}/b{y} @n.py:12", True),
+        ("plain", False),
+        ("{x}@:3", False),
+        ("{x}@n.py", False),
+        ("}{@n:1", False),
+        ("{x\n}@n:1", False),
+        ("first\n{x}@n:1", True),
+    ],
+)
+def test_name_that_the_source_does_not_tell_is_known(name, unknown):
+    assert is_unknown(name) is unknown
+
+
+def test_texts_that_match_almost_take_no_time():
+    before = time.process_time()
+    assert not is_unknown("{" * 20_000 + "}" * 20_000 + "@" * 20_000)
+    assert typed_cell("1" * 99_999 + "x") == "1" * 99_999 + "x"
+    parse_packages(f"PackageSet {{ CatkinPackage {'1' * 200_000}x {{ }} }}", "p.ros")
+    assert time.process_time() - before < 5
+
+
+@pytest.mark.parametrize("text", ["'" + "\\n" * 500_000 + "'", "'" + "x" * 1_000_000 + "'", "y" * 1_000_000])
+def test_long_text_is_read_without_much_memory(text):
+    code = (
+        "import resource, sys; from ros_model.language.packages_reader import parse_packages as parse;"
+        "used = lambda: resource.getrusage(resource.RUSAGE_SELF).ru_maxrss; text = sys.stdin.read();"
+        "parse('PackageSet { CatkinPackage a { } }', 'a.ros'); before = used(); parse(text, 'a.ros');"
+        "print(used() - before)"
+    )
+    model = f"PackageSet {{ CatkinPackage {text} {{ }} }}"
+    done = subprocess.run([sys.executable, "-c", code], input=model, capture_output=True, text=True, check=True)
+    assert int(done.stdout) < 30_000  # kB

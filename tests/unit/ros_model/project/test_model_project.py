@@ -2,6 +2,7 @@
 
 import itertools
 import re
+import time
 
 import pytest
 import yaml
@@ -9,6 +10,7 @@ from ros_model.errors import ModelError
 from ros_model.generators.deployment import manipulator, reasoner
 from ros_model.io.project import load_project, problems_of
 from ros_model.language.metamodel import PortPath, compose
+from ros_model.project.tables import parse_table
 
 BASE = """RosSystem { Name base
     RosComponents (
@@ -479,3 +481,13 @@ def test_action_of_which_function_or_type_is_unclear_is_refused(load, settings, 
     settings["manipulator"] = common
     with pytest.raises(ModelError, match=re.escape(message)):
         load()
+
+
+def test_table_of_many_columns_takes_no_time(tmp_path):
+    columns = ",".join(f"c{number}" for number in range(80_000))
+    before = time.process_time()
+    table = parse_table(f"name,{columns}\na,{','.join(['1'] * 80_000)}\n", tmp_path / "x.csv")
+    assert len(table.columns) == 80_000
+    assert time.process_time() - before < 3
+    with pytest.raises(ModelError, match="column 'c1' is empty or stands twice"):
+        parse_table("name,c1,c1\n", tmp_path / "x.csv")

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import socket
+import struct
 import threading
-from contextlib import contextmanager
+import time
+from contextlib import contextmanager, suppress
 from io import BytesIO
 from xmlrpc.server import SimpleXMLRPCServer
 
@@ -14,7 +16,8 @@ import rosgraph.network
 from helpers.ports import QUIET_HOST, reserved_port
 from ros_model.cli.rosmodel import main
 from ros_model.graph.snapshot import GraphSnapshot, NodeState, ServiceState
-from ros_model_extraction.io.live_nodes import ask_nodes
+from ros_model_extraction.io import live_nodes
+from ros_model_extraction.io.live_nodes import ask_nodes, executable_of
 
 PATIENCE_S = 20.0
 IMPATIENCE_S = 0.5
@@ -154,3 +157,55 @@ def test_patience_must_be_a_finite_time(timeout, tmp_path, capsys):
         main(["snapshot", "-o", str(tmp_path), "--master", "http://localhost:1", "--timeout", timeout])
     assert ended.value.code == 2
     assert "Invalid value for '--timeout'" in capsys.readouterr().err
+
+
+def dripping(connection: socket.socket) -> None:
+    connection.recv(4096)
+    with suppress(OSError):
+        connection.sendall(struct.pack("<I", 60_000))
+        while True:  # until the other side has had enough
+            connection.sendall(b"x")
+            time.sleep(IMPATIENCE_S / 10)
+
+
+def huge(connection: socket.socket) -> None:
+    connection.recv(4096)
+    with suppress(OSError):
+        connection.sendall(struct.pack("<I", 2**31))
+        while connection.recv(4096):
+            pass
+
+
+@pytest.mark.parametrize("answer", [dripping, huge])
+def test_service_whose_answer_does_not_end_has_no_type(answer):
+    found = []
+    with tcp_server(answer) as port:
+        address = [1, "", f"rosrpc://{QUIET_HOST}:{port}"]
+        with xmlrpc_server(lookupService=lambda _caller, _name: address, getPid=lambda _: [1, "", 1]) as master:
+            patience = IMPATIENCE_S if answer is dripping else 10 * PATIENCE_S
+            asked = lambda: found.append(ask_nodes(graph(master, "/Empty"), master, patience))  # noqa: E731
+            thread = threading.Thread(target=asked, daemon=True)
+            thread.start()
+            thread.join(PATIENCE_S)
+    assert [one.service_types for one in found] == [{}]
+
+
+def test_program_that_is_a_long_text_is_of_no_package(tmp_path):
+    arguments = ["/usr/bin/python3", "-c", "import time\n" + "# long\n" * 2000]
+    assert executable_of(arguments, tmp_path, ["p"]) is None
+
+
+def test_program_below_a_package_that_can_not_be_read_is_of_no_package(tmp_path):
+    (tmp_path / "package.xml").write_text("<package")
+    (tmp_path / "program").write_text("")
+    assert executable_of([str(tmp_path / "program")], tmp_path, []) is None
+
+
+def test_node_that_can_not_be_looked_at_does_not_hinder_the_others(monkeypatch):
+    def origin(*_):
+        raise RuntimeError("no way")
+
+    monkeypatch.setattr(live_nodes, "_origin", origin)
+    with xmlrpc_server(getPid=lambda _: [1, "", os.getpid()]) as node:
+        found = ask_nodes(graph(node), node, PATIENCE_S)
+    assert found.unknown == {"/a": f"its process {os.getpid()} can't be looked at (RuntimeError: no way)"}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from typing import TYPE_CHECKING
 
 from ros_model.errors import ModelError
@@ -21,14 +22,14 @@ if TYPE_CHECKING:
 def wrong_names(project: Project) -> Iterator[ModelError]:
     """Yield variants of one name, and designs and components that are not there."""
     source = project.source
-    known = [variant.name for variant in project.variants]
-    for name in sorted({name for name in known if known.count(name) > 1}):
+    known = Counter(variant.name for variant in project.variants)
+    for name in sorted(name for name, count in known.items() if count > 1):
         yield source.error(f"two variants bear the name {name!r}: rename one", "variants")
     for name, function in project.settings["functions"].items():
         for number, design in enumerate(function["designs"] if function["designs"] != "all" else ()):
             if design not in known:
                 keys = ("functions", name, "designs", number)
-                yield source.error(f"{design!r} is none of the {len(known)} variants", *keys)
+                yield source.error(f"{design!r} is none of the {len(project.variants)} variants", *keys)
         if isinstance(function.get("requires"), dict):
             solving = {design.name for design in project.designs(name)}
             for design in function["requires"]:

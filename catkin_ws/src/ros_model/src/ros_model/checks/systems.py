@@ -11,6 +11,7 @@ from ros_model.checks.references import followed, incomplete, not_followed, not_
 from ros_model.checks.values import misfits
 from ros_model.findings import WARNING, Finding, sorted_by_place
 from ros_model.language.library import Installed, Library
+from ros_model.language.metamodel import unclear_ends
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
@@ -52,6 +53,8 @@ def check_system(
         findings += not_followed(system)
     if installed:
         findings += missing_executables(system, installed)
+    for end, text in unclear_ends(system, whole):
+        findings.append(Finding(text, end.position, "duplicate"))
     for connection in system.connections:
         problems = [*wrong_ends(connection, whole)]
         findings += problems or (wrong_types(connection, whole, library) if library else ())

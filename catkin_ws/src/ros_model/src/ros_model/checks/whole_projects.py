@@ -60,10 +60,9 @@ def _with_other_functions(project: Project, variant: RosSystem) -> RosSystem:
     """Return the base with the components that other functions deploy beside a variant: it may be connected to them."""
     families = [project.designs(function) for function in project.settings["functions"]]
     others = [design for designs in families if variant not in designs for design in designs]
-    known = {
-        component.name: component for system in (*reversed(others), project.base) for component in system.components
-    }
-    return replace(project.base, components=tuple(known.values()))
+    own = {component.name for system in (project.base, variant) for component in system.components}
+    known = {c.name: c for system in reversed(others) for c in system.components if c.name not in own}
+    return replace(project.base, components=(*known.values(), *project.base.components))
 
 
 def without_nodes(project: Project) -> Iterator[Finding]:

@@ -11,7 +11,7 @@ from ros_model.file_names import safe_file_name
 from ros_model.generators import variant_packages, write_files
 from ros_model.generators.launch_parameters import harmless, parameter_element, sent
 from ros_model.language.graph_names import ABSOLUTE_TOPICS
-from ros_model.language.metamodel import CONNECTION_OF, ENDS, PortPath, compose, topic_suffixes
+from ros_model.language.metamodel import CONNECTION_OF, ENDS, PortPath, compose, topic_suffixes, unclear_ends
 from ros_model.language.packages import Node
 from ros_model.language.remappings import remappings_of
 from ros_model.language.typed_values import type_for
@@ -84,9 +84,11 @@ def launch_file(
         parameter_files: files of nodes' parameters, by graph name; those of the models take precedence.
 
     Raises:
-        ModelError: a component names no executable, a name is not fit for ROS, or a text holds `$(`, which roslaunch
-            would evaluate.
+        ModelError: a component names no executable, a name is not fit for ROS or is that of several components that
+            are connected, or a text holds `$(`, which roslaunch would evaluate.
     """
+    for end, text in unclear_ends(whole or system, whole or system):
+        raise ModelError(text, end.position)
     launch = ET.Element("launch")
     launch.append(ET.Comment(_COMMENT))
     for parameter in system.parameters:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import math
 import re
 import shlex
 from typing import TYPE_CHECKING, Any
@@ -19,15 +21,24 @@ from rosgraph.names import ns_join
 
 from ros_model.errors import ModelError
 from ros_model.language.builder import MAX_NESTING
+from ros_model.language.expressions import FUNCTIONS, MATHEMATICS, ExpressionError, evaluate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
 MAX_YAML = 500_000
 """Bytes of the largest text of parameters; PyYAML takes 3 s for them. Files of parameters have some thousand."""
+MAX_FILES = 1_000
+"""Launch files of the largest load, each counted as often as it is included."""
+MAX_SUBSTITUTED = 20_000_000
+"""Characters that `$(...)` may make in a load: arguments made of arguments grow fast."""
+MAX_SUBSTITUTIONS = 1_000
+"""`$(...)` in a text: roslaunch looks through all of it for each."""
 EXPLAINED = (roslaunch.core.RLException, roslaunch.substitution_args.SubstitutionException, rospkg.ResourceNotFound)
 """Errors of roslaunch whose message says what is wrong."""
 
+_EVAL = "$(eval "
+_ARGUMENT = re.compile(r"\$\( *arg +([^ ()$]+)")
 _XML = re.compile(r"\.? (?:\w+ )?xml is (<[^>]*>).*", re.IGNORECASE)
 """How roslaunch ends a message: with an element and all that is in it."""
 _SHOWN = 100  # characters of an element or expression in a message
@@ -49,7 +60,9 @@ class LaunchContentError(ModelError):
 
 
 class LaunchLoader(roslaunch.xmlloader.XmlLoader):
-    """roslaunch's reader, without XML entities, and with limits for what parameters hold.
+    """roslaunch's reader, without XML entities, and with limits for what files and parameters hold.
+
+    It runs no Python of a file: expressions and angles are computed.
 
     Args:
         instead_of_programs: makes the value of a parameter of the command that would give it; None: the commands run.
@@ -61,6 +74,8 @@ class LaunchLoader(roslaunch.xmlloader.XmlLoader):
         super().__init__()
         self._instead_of_programs = instead_of_programs
         self._at: tuple[Any, Any] | None = None
+        self._files = 0
+        self._substituted = 0  # characters
 
     def load(self, filename: str, ros_config: Any, **options: Any) -> None:
         """Read a launch file into a configuration.
@@ -70,7 +85,11 @@ class LaunchLoader(roslaunch.xmlloader.XmlLoader):
         """
         try:
             super().load(filename, ros_config, **options)
-        except (LaunchContentError, *EXPLAINED):
+        except LaunchContentError:
+            raise
+        except EXPLAINED as error:
+            if content := _content_error(error):
+                raise content from error
             raise
         except (Exception, SystemExit) as error:  # whatever `$(eval ...)`, names and values make of it
             file, element = self._place(filename)
@@ -83,6 +102,24 @@ class LaunchLoader(roslaunch.xmlloader.XmlLoader):
         """Return attributes of an element, and note that it is being read: roslaunch asks so for each."""
         self._at = context, tag
         return super().opt_attrs(tag, context, attrs)
+
+    def resolve_args(self, args: str | None, context: Any) -> Any:
+        """Return a text with its `$(...)` replaced.
+
+        Raises:
+            LaunchContentError: an expression is not taken, or they make too much.
+            Exception: an expression fails, as in Python; or roslaunch refuses the text.
+        """
+        if not args or "$" not in args:
+            return args
+        given = context.resolve_dict
+        given["filename"] = context.filename
+        if args.startswith(_EVAL) and args.endswith(")"):
+            found = self._evaluated(args[len(_EVAL) : -1], given)
+            self._count(len(found))
+            return found
+        self._check_arguments(args, given.get("arg", {}))
+        return super().resolve_args(args, context)
 
     def param_value(
         self,
@@ -157,6 +194,9 @@ class LaunchLoader(roslaunch.xmlloader.XmlLoader):
         return text
 
     def _parse_launch(self, filename: str, verbose: bool) -> Any:  # noqa: ARG002
+        self._files += 1
+        if self._files > MAX_FILES:
+            raise self._refusal(f"there are more than {MAX_FILES} files with it: include fewer, or each once")
         try:
             content = read_bytes(filename)
         except InputFileError as error:
@@ -176,6 +216,53 @@ class LaunchLoader(roslaunch.xmlloader.XmlLoader):
         if len(roots) != 1:
             raise roslaunch.xmlloader.XmlParseException(f"{filename}: must have one root element <launch>")
         return roots[0]
+
+    def _evaluated(self, text: str, given: dict[str, Any]) -> str:
+        """Return what roslaunch makes of `$(eval text)`, without Python's `eval`.
+
+        Args:
+            text: the expression.
+            given: what roslaunch resolves by: `arg`, `anon` and `filename`.
+        """
+        if "__" in text:
+            raise roslaunch.substitution_args.SubstitutionException(
+                "$(eval ...) may not contain double underscore expressions"
+            )
+        arguments, known = given.setdefault("arg", {}), roslaunch.substitution_args
+        functions = {
+            **{"true": True, "false": False, "True": True, "False": False},
+            "anon": functools.partial(known._eval_anon, anons=given.setdefault("anon", {})),
+            "arg": lambda name: _typed(known._eval_arg(name, arguments)),
+            "dirname": lambda: known._eval_dirname(given["filename"]),
+            **{"env": known._eval_env, "optenv": known._eval_optenv, "find": known._eval_find},
+        }
+
+        def lookup(name: str) -> Any:
+            for names in (functions, MATHEMATICS):
+                if name in names:
+                    return names[name]
+            return _typed(arguments[name]) if name in arguments else FUNCTIONS[name]
+
+        try:
+            return str(evaluate(text, lookup))
+        except ExpressionError as error:
+            remedy = "files are read without Python: use numbers, texts, their methods and roslaunch's functions"
+            raise self._refusal(f"$(eval ...): {error}; {remedy}") from error
+
+    def _check_arguments(self, text: str, arguments: dict[str, str]) -> None:
+        """Refuse a text in which arguments would make too much."""
+        if text.count("$(") > MAX_SUBSTITUTIONS:
+            raise self._refusal(f"it has more than {MAX_SUBSTITUTIONS} $(...): write its values out")
+        values = [(name, arguments.get(name, "")) for name in _ARGUMENT.findall(text)]
+        for name, value in values:
+            if "$(" in value:  # roslaunch might replace in it, too
+                raise self._refusal(f"the argument {name} holds '$(': take it out")
+        self._count(len(text) + sum(len(value) for _, value in values))
+
+    def _count(self, characters: int) -> None:
+        self._substituted += characters
+        if self._substituted > MAX_SUBSTITUTED:
+            raise self._refusal(f"$(...) make more than {MAX_SUBSTITUTED} characters up to here: shorten the arguments")
 
     def _check_command(self, command: str) -> None:
         try:
@@ -232,6 +319,17 @@ class _Builder(expatbuilder.ExpatBuilderNS):
         raise _DocumentTypeError
 
 
+def _content_error(error: BaseException | None) -> LaunchContentError | None:
+    """Return the error of this module that roslaunch has put into one of its own; None: there is none."""
+    while error is not None and not isinstance(error, LaunchContentError):
+        error = error.__context__
+    return error
+
+
+def _typed(argument: str) -> Any:
+    return roslaunch.loader.convert_value(argument, "auto")
+
+
 def check_configuration(file: object, config: Any) -> None:
     """Check what roslaunch has made of a launch file.
 
@@ -277,7 +375,7 @@ def _size(value: Any, most: int) -> int:
 
 
 def _parse(text: str, name: str) -> Any:
-    """Return what a YAML text says, by PyYAML's safe loader, which roslaunch uses.
+    """Return what a YAML text says, by PyYAML's safe loader, which roslaunch uses, without Python in angles.
 
     Raises:
         YamlError: it is no YAML, is too large, is nested or expanded too far, or has a key that is no text.
@@ -285,7 +383,7 @@ def _parse(text: str, name: str) -> Any:
     if len(text) > MAX_YAML:
         raise YamlError(f"{len(text)} characters are too many (at most {MAX_YAML}): make it smaller")
     try:
-        loader = yaml.SafeLoader(text)
+        loader = _YamlLoader(text)
         node = loader.get_single_node()
         if node is None:
             return None
@@ -299,6 +397,41 @@ def _parse(text: str, name: str) -> Any:
     except Exception as error:  # whatever PyYAML's constructors make of dates, numbers and angles
         what = "nested too deep" if isinstance(error, RecursionError) else f"{type(error).__name__}: {error}"
         raise YamlError(f"parameter {name}: roslaunch can't read it: {what}: correct the YAML") from error
+
+
+class _YamlLoader(yaml.SafeLoader):
+    """PyYAML's safe loader, which computes the angles of rosparam: rosparam gives them to Python's `eval`.
+
+    It refuses long numbers: the time that PyYAML takes for base 60 (`1:59:59`) grows with the square of their length.
+    """
+
+    def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
+        """Return what a node says."""
+        if node.tag in _ANGLES and node.tag in self.yaml_constructors:  # rosparam adds them when it is imported
+            return self._angle(node)
+        if node.tag in _NUMBERS and len(node.value) > _MAX_NUMBER:
+            problem = f"a number has {len(node.value)} characters (at most {_MAX_NUMBER})"
+            raise yaml.constructor.ConstructorError(None, None, problem, node.start_mark)
+        return super().construct_object(node, deep=deep)
+
+    def _angle(self, node: Any) -> float:
+        text = str(self.construct_scalar(node)).strip()
+        kind = node.tag[1:]
+        prefix, compute = _ANGLES[node.tag]
+        try:
+            return compute(text[len(prefix) : -1] if text.startswith(prefix) else text)
+        except Exception as error:  # whatever an expression makes of its numbers
+            problem = f"{text[:_SHOWN]!r} is no angle in {kind}: {type(error).__name__}: {error}"
+            raise yaml.constructor.ConstructorError(None, None, problem, node.start_mark) from error
+
+
+_NUMBERS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
+_MAX_NUMBER = 1_100  # characters; the largest double has 1,024 digits in base 2
+_ANGLES: dict[str, tuple[str, Callable[[str], float]]] = {
+    "!radians": ("rad(", lambda text: float(evaluate(text, {"pi": math.pi}.__getitem__))),
+    "!degrees": ("deg(", lambda text: float(text) * math.pi / 180.0),
+}
+"""How rosparam writes angles in YAML: how a text may begin, and the angle in radians of what follows."""
 
 
 class _Measure:

@@ -17,7 +17,7 @@ PACKAGES = ".ros"
 SYSTEM = ".rossystem"
 """The extensions of the languages' files."""
 
-_FIRST_WORD = re.compile(r"(?:\s|//[^\n]*|/\*.*?\*/)*(\w*)", re.DOTALL)
+_FIRST_WORD = re.compile(r"(?:\s++|//[^\n]*+|/\*.*?\*/)*+(\w*)", re.DOTALL)
 
 
 def parse_all(text: str, file: str) -> RosSystem | PackageSet:

@@ -26,7 +26,7 @@ MAX_ERRORS = 20
 """Errors of one file that are told."""
 
 _INTEGER = re.compile(r"[-+]?\d{1,300}")  # longer ones are no double either
-_DOUBLE = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+_DOUBLE = re.compile(r"[-+]?(?:\d++\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _ESCAPE = re.compile(r"\\(?:u([0-9A-Fa-f]{4})|(.))", re.DOTALL)
 _ESCAPED = {"n": "\n", "t": "\t", "r": "\r", "b": "\b", "f": "\f", "'": "'", '"': '"', "\\": "\\"}
 _BOOLEANS = {"true": True, "True": True, "false": False, "False": False}

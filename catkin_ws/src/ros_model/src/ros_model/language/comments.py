@@ -42,8 +42,8 @@ _ELEMENTS = (  # what has a line of its own in the canonical form
 )
 _COMMENT = re.compile(r"\s*(?://(?P<line>[^\n]*)|/\*(?P<block>.*?)\*/)", re.DOTALL)
 _TOKEN = re.compile(
-    r"""(?P<comment>//(?P<line>[^\n]*)|/\*(?P<block>.*?)\*/)|'(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*"|[{}(),]"""
-    r"""|(?:(?!/\*)[^\s{}(),'"])+""",
+    r"""(?P<comment>//(?P<line>[^\n]*)|/\*(?P<block>.*?)\*/)|'(?:[^'\\]|\\.)*+'|"(?:[^"\\]|\\.)*+"|[{}(),]"""
+    r"""|(?:(?!/\*)[^\s{}(),'"])++""",
     re.DOTALL,
 )
 
@@ -112,13 +112,14 @@ def _owned(text: str, elements: list[_Place], named: _Place | None) -> Iterator[
     start = 0
     while match := _COMMENT.match(text, start):
         start = match.end()
-    line, line_start = 1, 0
+    line, line_start, looked_at = 1, 0, 0
     previous, previous_line, depth = "", 0, 0
     pending: list[tuple[_Place, list[str]]] = []  # comments that belong to the next element, if it is in these braces
     for match in _TOKEN.finditer(text):
-        line += text.count("\n", line_start, match.start())
-        line_start = match.start()
-        place = _Place(line, match.start() - (text.rfind("\n", 0, match.start()) + 1) + 1)
+        if breaks := text.count("\n", looked_at, match.start()):
+            line, line_start = line + breaks, text.rfind("\n", looked_at, match.start()) + 1
+        looked_at = match.start()
+        place = _Place(line, match.start() - line_start + 1)
         if match["comment"] is None:
             depth += (match[0] in _OPENING) - (match[0] in _CLOSING)
             at = named if depth == 1 and match[0] in _NAME else place if place in _known(elements, place) else None

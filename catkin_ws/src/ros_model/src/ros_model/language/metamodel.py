@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field, replace
 
 from ros_model.language.graph_names import resolve
@@ -301,24 +301,53 @@ class RosSystem:
         }
 
 
+def unclear(name: str, system: RosSystem) -> str:
+    """Return what is wrong with a name that several components of a system have, each in its namespace; "": nothing.
+
+    What names a component, such as an end of a connection, has nothing but that name.
+    """
+    found = sorted({component.graph_name for component in system.components if component.name == name})
+    if len(found) < 2:
+        return ""
+    return f"'{name}' is {' and '.join(found)}: name each component by its whole name, such as '{found[0]}'"
+
+
+def unclear_ends(system: RosSystem, whole: RosSystem) -> Iterator[tuple[PortPath, str]]:
+    """Yield the ends of a system's connections whose component is not clear, and why; once for each name.
+
+    Args:
+        system: the connections.
+        whole: the components that they may lead to.
+    """
+    nodes: dict[str, set[str]] = {}
+    for component in whole.components:
+        nodes.setdefault(component.name, set()).add(component.graph_name)
+    ends = (end for connection in system.connections for end in (*connection.sources, *connection.targets))
+    for name, end in {end.component: end for end in ends if len(nodes.get(end.component, ())) > 1}.items():
+        yield end, unclear(name, whole)
+
+
 def compose(base: RosSystem, variant: RosSystem) -> RosSystem:
-    """Return the whole system: the base with the variant's components in place of those of the same name.
+    """Return the whole system: the base with the variant's components in place of those of the same name in the graph.
 
     A replaced component's connections go with it: in the base's connections its ends are dropped, and those
     that lose all sources or all targets vanish, before the variant's connections and parameters are added.
     The result bears the variant's name.
     """
-    replaced = {component.name for component in variant.components}
+    replaced = {component.graph_name for component in variant.components}
+    components = tuple(component for component in base.components if component.graph_name not in replaced)
+    gone = {c.name for c in (*base.components, *variant.components) if c.graph_name in replaced}
+    gone -= {component.name for component in components}
     kept: list[Connection] = []
     for connection in base.connections:
-        sources = tuple(end for end in connection.sources if end.component not in replaced)
-        targets = tuple(end for end in connection.targets if end.component not in replaced)
+        sources = tuple(end for end in connection.sources if end.component not in gone)
+        targets = tuple(end for end in connection.targets if end.component not in gone)
         if sources and targets:
             kept.append(Connection(connection.name, connection.kind, sources, targets, connection.position))
     own = {parameter.name for parameter in variant.parameters}
     return RosSystem(
         name=variant.name,
-        components=(*(c for c in base.components if c.name not in replaced), *variant.components),
+        components=(*components, *variant.components),
         connections=(*kept, *variant.connections),
         parameters=(*(p for p in base.parameters if p.name not in own), *variant.parameters),
         header=variant.header,

@@ -15,12 +15,12 @@ if TYPE_CHECKING:
     from ros_model.language.metamodel import ParameterType, PortKind
 
 
-_UNKNOWN = re.compile(r"\{.*\}.*@.+:\d+")
+_UNKNOWN = re.compile(r"[^{]*+\{[^}]*+\}[^@]*+@..*?:\d")  # from the start of a line, in linear time
 
 
 def is_unknown(name: str) -> bool:
     """Tell whether a name is one that the source does not tell: an expression in braces, and the place after an @."""
-    return bool(_UNKNOWN.search(name))
+    return any(map(_UNKNOWN.match, name.split("\n")))
 
 
 @dataclass(frozen=True)

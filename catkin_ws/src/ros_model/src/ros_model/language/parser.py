@@ -25,7 +25,7 @@ _REPAIRABLE = 500_000  # characters of a text, and that are read again all in al
 
 _GRAMMARS = Path(__file__).parent / "grammar"
 _SKIPPED = re.compile(
-    r"""(?P<comment>//[^\n]*|/\*.*?\*/)|'(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*"|(?:(?!/\*)[^\s{}(),'"])+""", re.DOTALL
+    r"""(?P<comment>//[^\n]*|/\*.*?\*/)|'(?:[^'\\]|\\.)*+'|"(?:[^"\\]|\\.)*+"|(?:(?!/\*)[^\s{}(),'"])++""", re.DOTALL
 )
 _ENDS_OF_FILE = {"$END", "<END-OF-FILE>"}  # lark's parser and lexer each have a name for it
 _DESCRIBED = {

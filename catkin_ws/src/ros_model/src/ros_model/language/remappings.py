@@ -35,13 +35,12 @@ def remark_lines(remappings: Mapping[str, Sequence[tuple[str, str]]]) -> Iterato
 
 def remappings_of(header: str) -> dict[str, Remappings]:
     """Return the remappings that the lines of a header keep, by the node's name without its leading slash."""
-    found: dict[str, Remappings] = {}
+    found: dict[str, list[tuple[str, str]]] = {}
     for line in header.splitlines():
         if match := _LINE.match(line):
             pairs = (_PAIR.fullmatch(word) for word in match[2].split())
-            node = match[1].strip("/")
-            found[node] = (*found.get(node, ()), *((pair[1], pair[2]) for pair in pairs if pair))
-    return found
+            found.setdefault(match[1].strip("/"), []).extend((pair[1], pair[2]) for pair in pairs if pair)
+    return {node: tuple(pairs) for node, pairs in found.items()}
 
 
 def with_header(part: RosSystem, header: str, base: RosSystem) -> RosSystem:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Never
 
 from ros_model.errors import Gathered, ModelError
 from ros_model.language.library import hint
-from ros_model.language.metamodel import ENDS, PortPath, Position, Reference
+from ros_model.language.metamodel import ENDS, PortPath, Position, Reference, unclear
 
 if TYPE_CHECKING:
     from ros_model.language.metamodel import PortKind, RosSystem
@@ -247,6 +247,8 @@ def _wrong_names(columns: Columns, base: RosSystem) -> Iterator[ModelError]:
     for column, names in columns.presence.items():
         for number, name in enumerate(names):
             yield from unnamed(name, "components", column, number)
+            if told := unclear(name, base):
+                yield ModelError(told, columns.where("components", column, number))
     for column, choices in columns.wires.items():
         for value, wires in choices.items():
             for number, wire in enumerate(wires):

@@ -6,6 +6,7 @@ import csv
 import fnmatch
 import io
 import re
+from collections import Counter
 from dataclasses import dataclass, field
 from itertools import count, zip_longest
 from typing import TYPE_CHECKING
@@ -259,9 +260,9 @@ def _left_out(component: Component, columns: Mapping[str, _Column], choices: Cho
 
 def _nodes(base: RosSystem) -> dict[str, str]:
     """Return the name of each component's node, by the component's name; by the node's if two have that name."""
-    names = [component.name for component in base.components]
+    names = Counter(component.name for component in base.components)
     return {
-        component.name if names.count(component.name) == 1 else component.graph_name: component.graph_name
+        component.name if names[component.name] == 1 else component.graph_name: component.graph_name
         for component in base.components
     }
 

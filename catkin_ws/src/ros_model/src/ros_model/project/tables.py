@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -23,7 +24,7 @@ NAME = "name"
 FORMATS = (".csv", ".yaml", ".yml")
 """Extensions of files that can be tables."""
 _INTEGER = re.compile(r"[-+]?\d{1,18}")
-_DOUBLE = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?")
+_DOUBLE = re.compile(r"[-+]?(?:\d++\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?")
 _BOOLEANS = {"true": True, "True": True, "false": False, "False": False}
 _LARGEST_CELL = 100_000
 _LARGEST_NUMBER = 1e300  # NaN is not below it either, nor are integers that no double holds
@@ -100,7 +101,7 @@ def _csv_rows(text: str, path: Path, wrong: Gathered) -> list[Row]:
         columns = [column.strip() for column in next(reader, [])]
         if NAME not in columns:
             raise _fault(f"no column {NAME!r}: the first line must name the columns", Position(str(path), 1, 1))
-        if twice := dict.fromkeys(column for column in columns if columns.count(column) > 1 or not column):
+        if twice := [column for column, count in Counter(columns).items() if count > 1 or not column]:
             raise first_of(
                 _fault(f"column {column!r} is empty or stands twice", Position(str(path), 1, 1)) for column in twice
             )

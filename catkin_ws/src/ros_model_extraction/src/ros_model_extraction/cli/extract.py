@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from node_kit.one_line import one_line
 from ros_model.cli import BAD_INPUT
 from ros_model.errors import ModelError
 
@@ -86,14 +87,16 @@ def _packages(path: Path, output: str) -> int:
     for folder in folders:
         try:
             extracted = extract_package(folder)
-        except ModelError as error:
-            click.echo(f"rosmodel: {error}", err=True)
+            model = extracted.model()
+        except Exception as error:  # whatever a source makes of its reader: the other packages are read anyway
+            unforeseen = f"{folder}: can't be read ({type(error).__name__}: {error}): report it with the package"
+            click.echo(f"rosmodel: {error if isinstance(error, ModelError) else one_line(unforeseen)}", err=True)
             status = BAD_INPUT
             continue
         for remark in extracted.unread:
             click.echo(f"rosmodel: {folder}/{remark}", err=True)
             status = max(status, _INCOMPLETE)
-        written = write_package_set(extracted.model(), output, extracted.package.name)
+        written = write_package_set(model, output, extracted.package.name)
         nodes = [node for node in extracted.nodes.values() if node.is_node]
         ports = [port for node in nodes for port in node.ports]
         unknown = sum(not port.is_resolved or not port.type for port in ports)

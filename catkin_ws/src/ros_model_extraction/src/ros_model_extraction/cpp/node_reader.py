@@ -531,7 +531,7 @@ class _Reader:
             yield inner
             return
         shown = re.sub(r"<[^<>]*>", "", text(argument))
-        names = re.findall(r"&?\s*((?:\w+::)*\w+)", shown)
+        names = re.findall(r"(?:\w+::)*\w+", shown)
         for name in names if argument.type == "call_expression" else names[:1]:
             if found := self._program.function(name, place.owner):
                 yield found[0]

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import tree_sitter_cpp
+from node_kit.io.input_files import real_path
 from ros_model.language.metamodel import Position
 from tree_sitter import Language, Node, Parser
 
@@ -61,11 +62,11 @@ def _read_files(sources: Iterable[Path], package_folder: Path) -> tuple[list[Fil
     remarks: list[Remark] = []
     todo, seen = list(sources), set()
     others = _OtherPackages(package_folder)
-    while todo or (todo := [path for path in _plugins(files, others) if path.resolve() not in seen]):
+    while todo or (todo := [path for path in _plugins(files, others) if real_path(path) not in seen]):
         path = todo.pop(0)
-        if path.resolve() in seen:
+        if real_path(path) in seen:
             continue
-        seen.add(path.resolve())
+        seen.add(real_path(path))
         try:
             files.append(_read(path, others.shown(path), remarks))
         except SourceError as error:
@@ -149,8 +150,8 @@ def _plugins(files: Sequence[File], others: _OtherPackages) -> Iterator[Path]:
     for package, name in sorted((package.decode(), name.decode()) for package, name in named):
         folder = others.any_folder(package)
         exported = re.compile(rf"PLUGINLIB_EXPORT_CLASS\(\s*[\w:]*\b{name}\s*,".encode())
-        for path in sorted(folder.rglob("*.cpp")) if folder else ():
-            if os.path.isfile(path) and exported.search(_content(path)):
+        for path in sorted(_files_below(folder)) if folder else ():
+            if path.suffix == ".cpp" and os.path.isfile(path) and exported.search(_content(path)):
                 yield path
 
 
@@ -170,15 +171,32 @@ def _of_other_packages(file: File, others: _OtherPackages) -> Iterator[Path]:
         if folder is None or header is None or not os.path.isfile(header):
             continue
         yield header
-        stem = header.stem
-        yield from sorted(path for path in (folder / "src").rglob(f"{stem}.*") if path.suffix in _SOURCES)
+        alike = (path for path in _files_below(folder / "src") if path.name.startswith(f"{header.stem}."))
+        yield from sorted(path for path in alike if path.suffix in _SOURCES)
+
+
+def _files_below(top: Path) -> Iterator[Path]:
+    """Yield the files below a folder, in no order; links to folders are not followed."""
+    todo = [top]
+    while todo:
+        folder = todo.pop()
+        try:
+            with os.scandir(folder) as entries:
+                for entry in entries:
+                    if entry.is_dir(follow_symlinks=False):
+                        todo.append(folder / entry.name)
+                    else:
+                        yield folder / entry.name
+        except OSError:  # it is missing, or not for us
+            continue
 
 
 def _included(file: File, path: Path, folder: Path) -> Iterator[Path]:
+    real = real_path(folder)
     for name in _includes(file):
         for place in (path.parent, folder / "include", folder / "src"):
             header = place / name
-            if name.endswith(_HEADERS) and os.path.isfile(header) and header.resolve().is_relative_to(folder.resolve()):
+            if name.endswith(_HEADERS) and os.path.isfile(header) and real_path(header).is_relative_to(real):
                 yield header
                 break
 

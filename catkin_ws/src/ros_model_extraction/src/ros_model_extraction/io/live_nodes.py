@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import io
 import os
 import socket
+import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,6 +12,7 @@ from urllib.parse import urlsplit
 
 import rosgraph.network
 import rospkg
+from node_kit.io.input_files import is_file
 from node_kit.io.xml_rpc import CallError, Client, GoneError
 
 from ros_model_extraction.running.details import Details, Origin
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 _CALLER = "/rosmodel"
 _WORKERS = 16
-_HEADER_PART = 4096
+_MAX_HEADER = 64_000  # bytes of the header by which a service answers; it has some hundred
 
 
 def ask_nodes(snapshot: GraphSnapshot, master: str, timeout: float = 2.0) -> Details:
@@ -37,7 +38,7 @@ def ask_nodes(snapshot: GraphSnapshot, master: str, timeout: float = 2.0) -> Det
         service_types = {service: type_name for service, type_name in types if type_name}
     origins, unknown = {}, {}
     for node, pid in pids.items():
-        found = _origin(pid, known) if isinstance(pid, int) else pid
+        found = _looked_at(pid, known) if isinstance(pid, int) else pid
         if isinstance(found, Origin):
             origins[node] = found
         else:
@@ -55,11 +56,18 @@ def _pid(uri: str, timeout: float) -> int | str:
         host = urlsplit(uri).hostname or ""
         with Client(uri, _CALLER, timeout, peer="node") as node:
             pid = node.pid()
+        return pid if rosgraph.network.is_local_address(host) else f"it runs on the host {host}"
     except GoneError:
         return _DEAD
-    except (CallError, ValueError):
+    except (CallError, OSError, ValueError):  # OSError: its host is not known
         return "it does not answer"
-    return pid if rosgraph.network.is_local_address(host) else f"it runs on the host {host}"
+
+
+def _looked_at(pid: int, packages: set[str]) -> Origin | str:
+    try:
+        return _origin(pid, packages)
+    except Exception as error:  # whatever command lines and folders make of it: the other nodes are asked anyway
+        return f"its process {pid} can't be looked at ({type(error).__name__}: {error})"
 
 
 def _origin(pid: int, packages: set[str]) -> Origin | str:
@@ -88,9 +96,9 @@ def executable_of(arguments: Sequence[str], folder: Path, packages: Iterable[str
         if not argument or is_option or ":=" in argument or (not number and Path(argument).name.startswith("python")):
             continue
         path = folder / argument
-        if not path.is_file():
+        if not is_file(path):
             break
-        package = path.parent.name if path.parent.name in known else rospkg.get_package_name(str(path))
+        package = path.parent.name if path.parent.name in known else _package_of(path)
         origin = Origin(package, path.name, *told(arguments[number + 1 :])) if package else None
         if origin and os.access(path, os.X_OK):
             return origin
@@ -98,6 +106,14 @@ def executable_of(arguments: Sequence[str], folder: Path, packages: Iterable[str
         if origin is None:
             break  # the program is in no package: what follows are its arguments
     return found
+
+
+def _package_of(path: Path) -> str | None:
+    try:
+        name: str | None = rospkg.get_package_name(str(path))
+    except Exception:  # of a package.xml above it that can't be read
+        return None
+    return name
 
 
 def told(arguments: Iterable[str]) -> tuple[tuple[tuple[str, str], ...], tuple[str, ...]]:
@@ -126,13 +142,34 @@ def _service_addresses(master: str, services: Iterable[str], timeout: float) -> 
 
 
 def _service_type(service: str, uri: str, timeout: float) -> str:
-    """Ask the node that offers a service for its type, as rosservice does; "" where it does not answer."""
+    """Ask the node that offers a service for its type, as rosservice does; "" where it does not answer in time."""
+    deadline = time.monotonic() + timeout
     try:
         address = urlsplit(uri)
         with socket.create_connection((address.hostname, address.port), timeout) as connection:
             question = {"probe": "1", "md5sum": "*", "callerid": _CALLER, "service": service}
             rosgraph.network.write_ros_handshake_header(connection, question)
-            answer = rosgraph.network.read_ros_handshake_header(connection, io.BytesIO(), _HEADER_PART)
-        return str(answer.get("type", ""))
-    except (OSError, LookupError, TypeError, ValueError, rosgraph.network.ROSHandshakeException):
+            size = _received(connection, 4, deadline)
+            header = _received(connection, int.from_bytes(size, "little"), deadline)
+        return str(rosgraph.network.decode_ros_handshake_header(size + header).get("type", ""))
+    except Exception:  # whatever addresses and answers make of it: the other services are asked anyway
         return ""
+
+
+def _received(connection: socket.socket, size: int, deadline: float) -> bytes:
+    """Return so many bytes of what the other side sends.
+
+    Raises:
+        OSError: they do not come by the deadline, a time of the monotonic clock.
+        ValueError: they are too many.
+    """
+    if size > _MAX_HEADER:
+        raise ValueError(f"{size} bytes are too many")
+    data = bytearray()
+    while len(data) < size:
+        connection.settimeout(max(deadline - time.monotonic(), 1e-3))
+        part = connection.recv(size - len(data))
+        if not part or time.monotonic() > deadline:
+            raise TimeoutError("the answer ends, or takes too long")
+        data += part
+    return bytes(data)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from catkin_pkg.package import InvalidPackage, parse_package_string
+from node_kit.io.input_files import real_path
 from ros_model.errors import ModelError
 from ros_model.language.metamodel import Position
 
@@ -91,7 +92,7 @@ def find_packages(path: Path) -> tuple[tuple[Path, ...], tuple[Remark, ...]]:
     if not path.is_dir():
         raise ModelError(f"{path}: is no folder: give the folder of a ROS package, or of several")
     remarks: list[Remark] = []
-    found = tuple(_packages_below(path, set(), remarks))
+    found = tuple(_packages_below(path, remarks))
     if not found:
         said = "".join(f"; {remark.position.file}: {remark.text}" for remark in remarks)
         raise ModelError(f"{path}: no {MANIFEST} here or below: give the folder of a ROS package, or of several{said}")
@@ -287,24 +288,28 @@ class _Executables:
         return found
 
 
-def _packages_below(folder: Path, seen: set[Path], remarks: list[Remark]) -> Iterator[Path]:
-    real = folder.resolve()
-    if real in seen:
-        return
-    seen.add(real)
-    try:
-        entries = _enter(folder)
-    except OSError as error:
-        remarks.append(Remark(Position(str(folder), 1, 1), f"not read: {error.strerror or error}"))
-        return
-    if (folder / "CATKIN_IGNORE").exists():
-        return
-    if (folder / MANIFEST).is_file():
-        yield folder
-        return
-    for entry in entries:
-        if os.path.isdir(entry) and not entry.name.startswith(".") and entry.name not in _IGNORED_FOLDERS:
-            yield from _packages_below(entry, seen, remarks)
+def _packages_below(top: Path, remarks: list[Remark]) -> Iterator[Path]:
+    seen: set[Path] = set()
+    todo = [top]
+    while todo:
+        folder = todo.pop()
+        real = real_path(folder)
+        if real in seen:
+            continue
+        seen.add(real)
+        try:
+            entries = _enter(folder)
+            is_left_out, is_package = os.path.exists(folder / "CATKIN_IGNORE"), (folder / MANIFEST).is_file()
+        except OSError as error:
+            remarks.append(Remark(Position(str(folder), 1, 1), f"not read: {error.strerror or error}"))
+            continue
+        if is_left_out:
+            continue
+        if is_package:
+            yield folder
+            continue
+        searched = (entry for entry in reversed(entries) if entry.name not in _IGNORED_FOLDERS)
+        todo += [entry for entry in searched if os.path.isdir(entry) and not entry.name.startswith(".")]
 
 
 def _scripts(package: Path, remarks: list[Remark]) -> Iterator[Path]:

@@ -10,7 +10,7 @@ from itertools import islice
 from pathlib import Path
 
 _TOKEN = re.compile(
-    r"""\#[^\n]* | "(?P<quoted>(?:[^"\\]|\\.)*)" | (?P<open>\() | (?P<close>\)) | (?P<bare>(?:[^\s()"\#\\]|\\.)+)""",
+    r"""\#[^\n]* | "(?P<quoted>(?:[^"\\]|\\.)*+)" | (?P<open>\() | (?P<close>\)) | (?P<bare>(?:[^\s()"\#\\]|\\.)++)""",
     re.DOTALL | re.VERBOSE,
 )
 _BRACKET = re.compile(r"#?\[(=*)\[")
