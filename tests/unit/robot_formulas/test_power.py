@@ -1,7 +1,7 @@
 import math
 
 import pytest
-from robot_formulas.power import Battery, PowerError, PowerMeter, check_factor, energy_level, power_load
+from robot_formulas.power import LARGEST, Battery, PowerError, PowerMeter, check_factor, energy_level, power_load
 
 
 @pytest.mark.parametrize(
@@ -17,7 +17,7 @@ def test_load_is_clipped():
     assert power_load(5.0, 40.0, 50.0) == 5.0
 
 
-@pytest.mark.parametrize("factor", [-0.1, math.nan, math.inf])
+@pytest.mark.parametrize("factor", [-0.1, math.nan, math.inf, 1e308])
 def test_bad_factor_is_refused(factor):
     with pytest.raises(PowerError, match="refused"):
         check_factor(factor)
@@ -66,12 +66,34 @@ def test_meter_whose_clock_comes_late_does_not_count_the_time_before_it():
     assert meter.tick(1001.0) == pytest.approx(0.04 * 20.0)
 
 
-def test_meter_refuses_what_is_not_finite():
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, 1.7e308, -1.7e308])
+def test_meter_refuses_what_is_not_finite_or_absurd(value):
     meter = PowerMeter(0.0)
     for take in (meter.add_speed, meter.add_acceleration):
-        with pytest.raises(PowerError):
-            take(math.nan)
+        with pytest.raises(PowerError, match="of a robot"):
+            take(value)
     assert meter.tick(1.0) == 0.2
+
+
+def test_largest_values_give_the_full_load():
+    meter = PowerMeter(0.0)
+    meter.factor = check_factor(LARGEST)
+    meter.add_speed(-LARGEST)
+    meter.add_acceleration(LARGEST)
+    for _ in range(100):
+        meter.add_command()
+    assert meter.tick(1e-300) == 5.0
+
+
+def test_meter_starts_anew_also_where_it_can_not_tell_the_load():
+    meter = PowerMeter(0.0)
+    meter.factor = math.inf
+    with pytest.raises(PowerError):
+        meter.tick(1.0)
+    meter.factor = 1.0
+    for _ in range(20):
+        meter.add_command()
+    assert meter.tick(2.0) == pytest.approx(0.04 * 20.0)
 
 
 def test_full_load_empties_the_battery_in_three_hours():

@@ -2,6 +2,7 @@
 
 import math
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from metacontrol_manipulation.handling.driving import AT_PLACE, SPEED, TURN_RATE, has_arrived, speeds
@@ -39,3 +40,10 @@ def test_a_base_that_still_moves_or_is_elsewhere_has_not_arrived():
     assert not has_arrived(Pose(0.0, 0.0), (0.0, 0.05, 0.0))
     assert not has_arrived(Pose(2 * AT_PLACE, 0.0), STILL)
     assert not has_arrived(Pose(0.0, 0.0, 2 * AT_PLACE), STILL)
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_a_place_that_is_not_finite_gives_no_speed(bad):
+    for to_go in (Pose(bad, 0.5, 0.5), Pose(0.5, bad, 0.5), Pose(0.5, 0.5, bad)):
+        assert speeds(to_go) == (0.0, 0.0, 0.0)
+        assert not has_arrived(to_go, STILL)

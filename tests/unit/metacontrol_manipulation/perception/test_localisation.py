@@ -74,8 +74,20 @@ def test_track_gives_the_pose_that_is_nearest_in_time():
         track.add(0.02 * number, Pose(0.001 * number, 0.0))
     assert track.at(5.0).x == pytest.approx(0.250)
     assert track.at(5.011).x == pytest.approx(0.251)
-    assert track.at(99.0) == track.latest
+    assert track.at(6.9) == track.latest
+    assert track.at(99.0) is None  # it is to come
     assert track.at(0.0).x > 0.05  # that long ago is forgotten
-    track.add(1.0, Pose(7.0, 0.0))  # the clock was set back
-    assert track.at(3.0).x == 7.0
+    assert not track.is_set_back(5.9)  # two messages have changed places
+    assert track.is_set_back(1.0)
+    track.add(1.0, Pose(7.0, 0.0))
+    assert track.at(0.0).x == track.at(2.0).x == 7.0
+    assert track.at(5.0) is None
     assert math.isclose(track.latest.x, 7.0)
+
+
+def test_track_of_odometry_without_times_does_not_grow_for_ever():
+    track = Track()
+    for number in range(20_000):
+        track.add(0.0, Pose(float(number), 0.0))
+    assert len(track._times) == len(track._poses) <= 4000
+    assert track.latest.x == 19_999.0

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -37,6 +39,11 @@ def test_key_that_stands_twice_is_refused_only_where_places_count():
         parse_marked_yaml("a: 1\na: 2\n")
 
 
+@pytest.mark.parametrize("largest", [int(1.7e308), -int(1.7e308)])
+def test_longest_number_that_a_float_can_hold_is_read(largest):
+    assert parse_yaml(f"[{largest:_}, {largest:#b}]") == [largest, largest]
+
+
 BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
     f"{name}: &{name} [{', '.join([f'*{before}'] * 9)}]\n" for before, name in zip("abcdefg", "bcdefgh", strict=True)
 )
@@ -58,6 +65,12 @@ BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
         ("!!python/object/apply:os.system [ls]", "could not determine a constructor"),
         ("\x00", "special characters are not allowed"),
         ("a" * 4_000_001, "are too many"),
+        (f"a: 1{':1' * 700}", "1:4: a number has 1401 characters (at most 1100): correct it"),
+        (f"a: 1{':1' * 700}.0", "a number has 1403 characters"),
+        (f"- {'9' * 1200}", "1:3: a number has 1200 characters"),
+        (f"- {'9' * 1200}.0", "a number has 1202 characters"),
+        (f"!!int {{=: '{'1_' * 700}1'}}", "a number has 1401 characters"),
+        (f"{'9' * 400}", "a number is too large"),
     ],
 )
 def test_yaml_that_can_not_be_used_is_refused_in_one_line(text, message):
@@ -66,6 +79,13 @@ def test_yaml_that_can_not_be_used_is_refused_in_one_line(text, message):
             parse(text)
         assert message in str(caught.value)
         assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("text", "said"), [("rad(pi)", "{'a': 'rad(pi)'}"), ("!radians exit()", "YamlError")])
+def test_what_rosparam_teaches_pyyaml_is_not_evaluated(text, said):
+    code = "import rosparam, sys; from node_kit.yaml_text import parse_yaml; print(parse_yaml(sys.argv[1]))"
+    ended = subprocess.run([sys.executable, "-c", code, f"a: {text}"], capture_output=True, text=True, check=False)
+    assert said in ended.stdout + ended.stderr
 
 
 def test_text_loses_its_byte_order_mark(tmp_path: Path):
@@ -87,6 +107,11 @@ def test_file_that_is_too_large_is_refused(tmp_path: Path):
     path.write_bytes(b"12345")
     with pytest.raises(InputFileError, match="5 bytes are too many"):
         read_bytes(path, largest=4)
+
+
+def test_file_of_the_kernel_that_tells_no_size_is_read_no_further():
+    with pytest.raises(InputFileError, match="more than 10 bytes"):
+        read_bytes("/proc/self/maps", 10)
 
 
 @pytest.mark.parametrize("name", ["missing", "x" * 5000, "a/" * 3000, "nul\0", "folder", "loop", "pipe", "a\n\udc80b"])

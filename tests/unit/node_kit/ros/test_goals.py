@@ -73,6 +73,15 @@ def test_goal_that_does_not_end_is_cancelled(clock):
     assert clock.now >= 6.0
 
 
+def test_goal_that_does_not_end_is_cancelled_also_where_the_clock_is_set_back(monkeypatch):
+    clock = iter([1e9, *map(float, range(20))])
+    monkeypatch.setattr(rospy, "get_time", lambda: next(clock))
+    monkeypatch.setattr(rospy, "is_shutdown", lambda: False)
+    server = Server()
+    assert send_and_wait(server, "goal", 5.0) is None
+    assert server.handle.cancelled
+
+
 def test_node_that_ends_waits_no_longer(clock, monkeypatch):
     monkeypatch.setattr(rospy, "is_shutdown", lambda: True)
     server = Server()

@@ -229,3 +229,12 @@ def test_the_blind_time_ends_with_the_way_back():
     time, outcome, _ = go(controller, place, ABOVE, now + 0.02, lambda _: 100.0)
     assert outcome is Outcome.STOPPED
     assert time - now < 0.1
+
+
+def test_trajectory_ends_where_the_arm_is_when_the_clock_is_set_back():
+    controller = ArmController(LIMIT)
+    controller.follow(motion(), 1000.0, HERE)
+    assert controller.update(1000.5, (0.25,) * 7, 0.0) is None
+    assert controller.update(3.0, (0.25,) * 7, 0.0) is Outcome.SET_BACK
+    assert not controller.is_moving
+    assert controller.target == (0.25,) * 7

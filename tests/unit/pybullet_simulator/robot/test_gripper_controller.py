@@ -59,3 +59,11 @@ def test_each_command_ends_once():
 def test_command_out_of_range_is_refused(width, force):
     with pytest.raises(GripperError):
         GripperController().command(width, force, 0.0)
+
+
+def test_command_ends_though_the_clock_is_set_back():
+    gripper = GripperController()
+    gripper.command(0.04, 0.0, 1000.0)
+    assert gripper.update(1000.0, 0.06) is None
+    assert gripper.update(1.0, 0.06) is None
+    assert gripper.update(1.5, 0.06).stalled

@@ -19,6 +19,9 @@ MAX_VALUES = 200_000
 """Values of the largest text that is read, aliases counted as often as they stand."""
 MAX_DEPTH = 200
 """Brackets and braces inside each other. PyYAML looks at all open ones for every token: 1,000 take it seconds."""
+MAX_DIGITS = 1100
+"""Characters of the longest number: the largest one that is used has 1024 digits in base 2. The time that PyYAML takes
+grows with the square of the length for base 60 (`1:59:59`), as Python 3.8's does for base 10."""
 
 _MERGE = "tag:yaml.org,2002:merge"
 _BAD_SCALARS = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
@@ -84,7 +87,13 @@ def _parse(text: str, places: dict[Keys, Place], is_unique: bool) -> Any:
 
 
 class _Loader(yaml.SafeLoader):
-    """A loader that gives up where brackets are nested too deep, or a number is larger than any that is used."""
+    """A loader that gives up where brackets are nested too deep, or a number is larger than any that is used.
+
+    It knows the types of PyYAML only: rosparam teaches the process's SafeLoader angles, and evaluates them as Python.
+    """
+
+    yaml_constructors = dict(yaml.constructor.SafeConstructor.yaml_constructors)
+    yaml_implicit_resolvers = {key: list(all_) for key, all_ in yaml.resolver.Resolver.yaml_implicit_resolvers.items()}
 
     def fetch_flow_collection_start(self, token: Any) -> None:
         """Take an opening bracket or brace."""
@@ -94,13 +103,27 @@ class _Loader(yaml.SafeLoader):
 
 
 def _construct_int(loader: _Loader, node: yaml.ScalarNode) -> int:
+    _check_length(loader, node)
     value: int = loader.construct_yaml_int(node)
     if abs(value) > sys.float_info.max:
         raise YamlError("a number is too large: correct it", _place(node))
     return value
 
 
+def _construct_float(loader: _Loader, node: yaml.ScalarNode) -> float:
+    _check_length(loader, node)
+    value: float = loader.construct_yaml_float(node)
+    return value
+
+
+def _check_length(loader: _Loader, node: yaml.ScalarNode) -> None:
+    length = len(loader.construct_scalar(node))
+    if length > MAX_DIGITS:
+        raise YamlError(f"a number has {length} characters (at most {MAX_DIGITS}): correct it", _place(node))
+
+
 _Loader.add_constructor("tag:yaml.org,2002:int", _construct_int)
+_Loader.add_constructor("tag:yaml.org,2002:float", _construct_float)
 
 
 def _check_size(root: yaml.Node) -> None:

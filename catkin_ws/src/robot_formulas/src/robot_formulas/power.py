@@ -19,6 +19,9 @@ BATTERY_CAPACITY_WH = 2400.0
 """Wh of the Ridgeback's battery, 24 V and 100 Ah."""
 
 
+LARGEST = 1e6
+"""m/s of a speed, m/s2 of an acceleration, and the largest factor: more can only be an error of its source."""
+
 BACKING_SPEED = 0.15
 """m/s. To drive backwards faster than this takes as much power as to drive ahead. Slower, it counts as standing, as in
 the published model, whose robot only backs off (0.1 m/s)."""
@@ -41,13 +44,15 @@ def power_load(
         additional_consumption: added to the load before the factor.
 
     Raises:
-        PowerError: an argument is not finite, or the factor is negative.
+        PowerError: an argument is not finite or far too large, or the factor is negative.
     """
     check_factor(factor)
     model = SPEED_COEFFICIENT * speed + ACCELERATION_COEFFICIENT * acceleration + RATE_COEFFICIENT * rate
     load = (model + additional_consumption) * factor
     if not math.isfinite(load):
-        raise PowerError(f"speed {speed}, acceleration {acceleration}, rate {rate}: every value must be finite")
+        raise PowerError(
+            f"speed {speed}, acceleration {acceleration}, rate {rate}: every value must be finite, and not absurd"
+        )
     return min(max(load, MIN_LOAD), MAX_LOAD)
 
 
@@ -55,10 +60,10 @@ def check_factor(factor: float) -> float:
     """Return the factor.
 
     Raises:
-        PowerError: it is negative or not finite.
+        PowerError: it is not within 0 and `LARGEST`.
     """
-    if not math.isfinite(factor) or factor < 0.0:
-        raise PowerError(f"consumption factor {factor} refused: it must be a finite number, 0 or more")
+    if not 0.0 <= factor <= LARGEST:
+        raise PowerError(f"consumption factor {factor} refused: it must be a number from 0 to {LARGEST:g}")
     return factor
 
 
@@ -94,20 +99,20 @@ class PowerMeter:
         """Take a forward speed in m/s; of a negative one, the magnitude counts from `BACKING_SPEED` on.
 
         Raises:
-            PowerError: it is not finite.
+            PowerError: it is not finite, or its magnitude is above `LARGEST`.
         """
-        if not math.isfinite(forward):
-            raise PowerError(f"forward speed {forward} is not finite")
+        if not abs(forward) <= LARGEST:
+            raise PowerError(f"forward speed {forward} m/s is no speed of a robot")
         self._speed = max(self._speed, -forward if forward < -BACKING_SPEED else forward)
 
     def add_acceleration(self, forward: float) -> None:
         """Take a forward acceleration in m/s2.
 
         Raises:
-            PowerError: it is not finite.
+            PowerError: it is not finite, or its magnitude is above `LARGEST`.
         """
-        if not math.isfinite(forward):
-            raise PowerError(f"forward acceleration {forward} is not finite")
+        if not abs(forward) <= LARGEST:
+            raise PowerError(f"forward acceleration {forward} m/s2 is no acceleration of a robot")
         self._acceleration = max(self._acceleration, forward)
 
     def add_command(self) -> None:
@@ -115,14 +120,16 @@ class PowerMeter:
         self._commands += 1
 
     def tick(self, now: float) -> float | None:
-        """Return the load since the last tick, and start anew; None if no time has passed or time ran backwards."""
-        if self._since is None or now <= self._since:
-            self._start(now)
-            return None
-        rate = self._commands / (now - self._since)
-        load = power_load(self._speed, self._acceleration, rate, self.factor)
+        """Return the load since the last tick, and start anew; None if no time has passed or time ran backwards.
+
+        Raises:
+            PowerError: the factor cannot be used; the meter starts anew all the same.
+        """
+        since, speed, acceleration, commands = self._since, self._speed, self._acceleration, self._commands
         self._start(now)
-        return load
+        if since is None or now <= since:
+            return None
+        return power_load(speed, acceleration, commands / (now - since), self.factor)
 
     def _start(self, now: float | None) -> None:
         self._since = now

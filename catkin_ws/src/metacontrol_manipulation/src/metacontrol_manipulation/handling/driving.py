@@ -24,8 +24,10 @@ def speeds(to_go: Pose) -> tuple[float, float, float]:
     """Return the speeds (forward, left in m/s, turn in rad/s) towards a place.
 
     Args:
-        to_go: pose of the place in base_link.
+        to_go: pose of the place in base_link; one that is not finite gives no speed.
     """
+    if not all(map(math.isfinite, (to_go.x, to_go.y, to_go.yaw))):
+        return 0.0, 0.0, 0.0
     distance = math.hypot(to_go.x, to_go.y)
     share = min(_GAIN, SPEED / distance) if distance > 0.0 else 0.0
     return share * to_go.x, share * to_go.y, max(-TURN_RATE, min(TURN_RATE, _GAIN * to_go.yaw))

@@ -27,6 +27,10 @@ _STANDING = 0.003
 """m, and rad, within which the base stands where it stood."""
 _HISTORY = 4.0
 """s for which places of the base are remembered: an image is that old at most when it has been read."""
+_MOST_PLACES = 4000
+"""Places that are remembered at most, whatever their times: as many as odometry at 1 kHz gives."""
+AHEAD = 1.0
+"""s: how far a clock may be ahead of another one. More means that the clock was set back, or that a stamp is wrong."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,8 +109,8 @@ class Track:
 
     def __init__(self) -> None:
         """Begin without a place."""
-        self._times: deque[float] = deque()
-        self._poses: deque[Pose] = deque()
+        self._times: deque[float] = deque(maxlen=_MOST_PLACES)
+        self._poses: deque[Pose] = deque(maxlen=_MOST_PLACES)
 
     def add(self, time: float, pose: Pose) -> None:
         """Take a pose of the base in odom, at a time in s. A time before the last one begins the track anew."""
@@ -119,14 +123,18 @@ class Track:
             self._times.popleft()
             self._poses.popleft()
 
+    def is_set_back(self, time: float) -> bool:
+        """Tell whether the clock was set back before a time in s at which a pose is to be added."""
+        return bool(self._times) and time < self._times[-1] - AHEAD
+
     @property
     def latest(self) -> Pose | None:
         """The newest pose."""
         return self._poses[-1] if self._poses else None
 
     def at(self, time: float) -> Pose | None:
-        """Return the pose that is nearest to a time in s; None if there is none yet."""
-        if not self._times:
+        """Return the pose that is nearest to a time in s; None if there is none yet, or the time is `AHEAD` of them."""
+        if not self._times or time > self._times[-1] + AHEAD:
             return None
         after = min(bisect_left(self._times, time), len(self._times) - 1)
         before = max(after - 1, 0)

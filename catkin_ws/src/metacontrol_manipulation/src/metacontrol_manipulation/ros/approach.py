@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-import actionlib
+import math
+
 import rospy
 from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal, MoveBaseResult
 from node_kit.parameters import ParameterError, ParameterTree
 from node_kit.ros.lifetime import Lifetime
 
+from metacontrol_manipulation.ros.action_server import SimpleServer
 from metacontrol_manipulation.ros.drive import Drive
 from metacontrol_manipulation.ros.errors import RobotError
 from metacontrol_manipulation.ros.places import BaseOdometry, GivenCell, pose_of
@@ -32,7 +34,7 @@ class Approach:
         self._odometry = BaseOdometry()
         self._cell = GivenCell(self._odometry, self._patience)
         self._drive = Drive(self._odometry, self._cell)
-        self._server = actionlib.SimpleActionServer("move_position", MoveBaseAction, self._move, auto_start=False)
+        self._server = SimpleServer("move_position", MoveBaseAction, self._move, auto_start=False)
         self._server.start()
 
     def _move(self, goal: MoveBaseGoal) -> None:
@@ -40,14 +42,19 @@ class Approach:
         if frame != CELL:
             self._server.set_aborted(MoveBaseResult(), f"the goal is in the frame {frame!r}: give it in {CELL!r}")
             return
+        target = pose_of(goal.target_pose.pose)
+        if not all(map(math.isfinite, (target.x, target.y, target.yaw))):
+            self._server.set_aborted(MoveBaseResult(), "the goal is not finite: give numbers for its position and yaw")
+            return
         try:
+            self._cell.wait()
             arrived = self._drive.go(
-                pose_of(goal.target_pose.pose),
+                target,
                 lambda: not self._server.is_preempt_requested(),
                 self._may_move,
                 patience=30.0 + self._patience,
             )
-        except RobotError as error:
+        except (RobotError, rospy.exceptions.ROSTimeMovedBackwardsException) as error:
             self._server.set_aborted(MoveBaseResult(), str(error))
             return
         if arrived:

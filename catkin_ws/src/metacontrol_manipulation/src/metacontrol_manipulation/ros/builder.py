@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import actionlib
 import rospy
 from node_kit.ros.resumed_goal import start_with, take_resumed_goal
 from pybullet_simulator.robot.manipulator import ARMS
@@ -18,6 +17,7 @@ from metacontrol_manipulation.msg import (
 )
 from metacontrol_manipulation.pick_place.actions import Action, Done, Stuck
 from metacontrol_manipulation.pick_place.building import Building
+from metacontrol_manipulation.ros.action_server import SimpleServer
 from metacontrol_manipulation.ros.errors import RobotError
 
 if TYPE_CHECKING:
@@ -42,14 +42,14 @@ class Builder:
         """
         self._robot, self._design = robot, design
         self._handler = Handler(ARMS)
-        self._server = actionlib.SimpleActionServer(ACTION, BuildPyramidAction, self._build, auto_start=False)
+        self._server = SimpleServer(ACTION, BuildPyramidAction, self._build, auto_start=False)
         start_with(self._server.action_server, take_resumed_goal(ACTION, BuildPyramidActionGoal))
 
     def _build(self, _goal: object) -> None:
         building = Building(self._robot, self._handler, self._design, lambda action: self._tell(building, action))
         try:
             ending = building.run(lambda: not (rospy.is_shutdown() or self._server.is_preempt_requested()))
-        except RobotError as error:
+        except (RobotError, rospy.exceptions.ROSTimeMovedBackwardsException) as error:
             ending = Stuck(str(error))
         placed = len(building.progress.filled)
         result = BuildPyramidResult(

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import rospy
 from geometry_msgs.msg import Twist
+from node_kit.ros.patience import Patience
 
 from metacontrol_manipulation.handling.driving import has_arrived, speeds
 
@@ -53,14 +54,14 @@ class Drive:
         Raises:
             RobotError: it is not known where the cell is.
         """
-        end = rospy.get_time() + patience
+        time_left = Patience(patience)
         try:
             for _ in range(_CORRECTIONS):
                 while is_wanted() and not rospy.is_shutdown():
                     to_go = self._place.cell() @ target
                     if has_arrived(to_go, self._odometry.velocity):
                         break
-                    if rospy.get_time() > end:
+                    if time_left.is_over():
                         return False
                     self._command(*(speeds(to_go) if may_move() else (0.0, 0.0, 0.0)))
                     rospy.sleep(1.0 / _RATE)

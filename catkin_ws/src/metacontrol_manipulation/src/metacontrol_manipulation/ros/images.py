@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import rospy
+from node_kit.ros.patience import Patience
 from pybullet_simulator.robot.manipulator import MAST_CAMERA
 from sensor_msgs.msg import CameraInfo, Image
 
@@ -62,7 +63,7 @@ def take_image(topic: str, patience: float) -> tuple[Image, Camera]:
     Raises:
         RobotError: the image does not come in time, or the camera is none.
     """
-    since, end = rospy.Time.now(), rospy.get_time() + patience
+    since, time_left = rospy.Time.now(), Patience(patience)
     news = threading.Condition()
     images: list[Image] = []
     infos: list[CameraInfo] = []
@@ -80,7 +81,7 @@ def take_image(topic: str, patience: float) -> tuple[Image, Camera]:
     try:
         with news:
             while not (images and infos):
-                if rospy.is_shutdown() or rospy.get_time() > end:
+                if rospy.is_shutdown() or time_left.is_over():
                     missing = "camera/camera_info" if images else topic
                     raise RobotError(f"nothing comes on {missing} for {patience:g} s: see whether its driver runs")
                 news.wait(0.1)

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Protocol
 import rospy
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry
+from node_kit.ros.patience import Patience
 from pybullet_simulator.robot.manipulator import HOME
 from robot_formulas.geometry import Pose, yaw_of
 
-from metacontrol_manipulation.perception.localisation import CellTracker, Localisation, Track
+from metacontrol_manipulation.perception.localisation import AHEAD, CellTracker, Localisation, Track
 from metacontrol_manipulation.ros.errors import RobotError
 from metacontrol_manipulation.ros.images import read_pixels, take_image
 
@@ -53,6 +54,7 @@ class BaseOdometry:
         """Begin to listen."""
         self._lock = threading.Lock()
         self._track = Track()
+        self._to_forget: list[Callable[[], None]] = []
         self.velocity = (0.0, 0.0, 0.0)
         """Forward and left in m/s, turn in rad/s."""
         self._input = rospy.Subscriber("odom", Odometry, self._on_odometry, queue_size=10, tcp_nodelay=True)
@@ -63,26 +65,49 @@ class BaseOdometry:
         Raises:
             RobotError: there is none.
         """
-        end = rospy.get_time() + _PATIENCE
+        patience = Patience(_PATIENCE)
         while True:
             with self._lock:
                 latest = self._track.latest
             if latest is not None:
                 return latest
-            if rospy.is_shutdown() or rospy.get_time() > end:
+            if rospy.is_shutdown() or patience.is_over():
                 raise RobotError(f"nothing comes on odom for {_PATIENCE:g} s: see whether the base's driver runs")
             rospy.rostime.wallsleep(0.02)
 
     def at(self, stamp: rospy.Time) -> Pose | None:
-        """Return the pose at a time of the last seconds; None before the first one."""
+        """Return the pose at a time of the last seconds; None before the first one, and for a time to come."""
         with self._lock:
-            return self._track.at(stamp.to_sec())
+            pose, is_known = self._track.at(stamp.to_sec()), self._track.latest is not None
+        if pose is None and is_known:
+            rospy.logwarn_throttle(
+                10.0, "odom is older than an image or a cell_pose: see the base's driver and the clocks"
+            )
+        return pose
+
+    def when_set_back(self, forget: Callable[[], None]) -> None:
+        """Have something done when the clock was set back: the frame odom may have begun anew.
+
+        Args:
+            forget: forgets places in the former frame odom; is called in a thread of rospy's.
+        """
+        self._to_forget.append(forget)
 
     def _on_odometry(self, message: Odometry) -> None:
-        twist = message.twist.twist
+        twist, stamp, pose = message.twist.twist, message.header.stamp.to_sec(), pose_of(message.pose.pose)
+        velocity = twist.linear.x, twist.linear.y, twist.angular.z
+        if not all(map(math.isfinite, (pose.x, pose.y, pose.yaw, *velocity))):
+            rospy.logwarn_throttle(10.0, "odom ignored: a number is not finite: see the base's driver")
+            return
         with self._lock:
-            self._track.add(message.header.stamp.to_sec(), pose_of(message.pose.pose))
-            self.velocity = twist.linear.x, twist.linear.y, twist.angular.z
+            is_set_back = self._track.is_set_back(stamp)
+        if is_set_back:
+            rospy.logwarn("the clock was set back: it has to be seen anew where the cell is")
+            for forget in self._to_forget:
+                forget()
+        with self._lock:
+            self._track.add(stamp, pose)
+            self.velocity = velocity
 
 
 class OwnTags:
@@ -95,8 +120,12 @@ class OwnTags:
             odometry: of the base; the frame odom begins where the base stood at home.
             home: pose of the base in the cell frame when it is at home.
         """
-        self._odometry = odometry
-        self._tracker = CellTracker(at_home(home))
+        self._odometry, self._home = odometry, home
+        self._begin()
+        odometry.when_set_back(self._begin)
+
+    def _begin(self) -> None:
+        self._tracker = CellTracker(at_home(self._home))
 
     def cell(self) -> Pose:
         """Return the pose of the cell frame in base_link, now."""
@@ -144,32 +173,41 @@ class GivenCell:
         self._news = threading.Condition()
         self._known: Localisation | None = None
         self._expected = at_home(home) if home else None
-        self._stamp = 0.0
+        self._stamp = -math.inf
+        odometry.when_set_back(self._forget)
         self._input = rospy.Subscriber("cell_pose", PoseWithCovarianceStamped, self._on_pose, queue_size=1)
 
     @property
     def age(self) -> float:
-        """Time since a tag was seen last, s."""
-        return rospy.get_time() - self._stamp
+        """Time since a tag was seen last, s; infinite where none was since the start, or the clock was set back."""
+        age = float(rospy.get_time() - self._stamp)
+        return age if age >= -AHEAD else math.inf
+
+    def wait(self) -> None:
+        """Wait until the cell was told.
+
+        Raises:
+            RobotError: it is not, for some time.
+        """
+        self._wait(lambda: self._known is not None)
 
     def cell(self) -> Pose:
         """Return the pose of the cell frame in base_link, now; before it was told, as odometry has it.
 
         Raises:
-            RobotError: it was never told, and home is not known.
+            RobotError: it was not told since the start, or since the clock was set back, and home is not known.
         """
-        if self._known is None and self._expected is None:
-            self._wait(lambda: self._known is not None)
         known = self._known or self._expected
-        assert known is not None  # noqa: S101 (it has been waited for)
+        if known is None:
+            raise RobotError("it is not known where the cell is: wait until a tag is seen")
         return known.moved(self._odometry.pose()).seen_from(self._odometry.pose())
 
     def is_seen(self) -> bool:
         """Return whether it is known well enough where the cell is, after some time for that."""
-        end = rospy.get_time() + _GLANCE
+        patience = Patience(_GLANCE)
         with self._news:
             while not self._is_good():
-                if rospy.is_shutdown() or rospy.get_time() > end:
+                if rospy.is_shutdown() or patience.is_over():
                     return False
                 self._news.wait(0.05)
         return True
@@ -183,21 +221,29 @@ class GivenCell:
         self._wait(self._is_good)
 
     def _is_good(self) -> bool:
-        if self._known is None or self.age > self._max_age:
+        known = self._known
+        if known is None or self.age > self._max_age:
             return False
-        return self._known.moved(self._odometry.pose()).deviation <= GOOD
+        return known.moved(self._odometry.pose()).deviation <= GOOD
 
     def _wait(self, is_known: Callable[[], bool]) -> None:
-        end = rospy.get_time() + self._patience
+        patience = Patience(self._patience)
         with self._news:
             while not is_known():
-                if rospy.is_shutdown() or rospy.get_time() > end:
+                if rospy.is_shutdown() or patience.is_over():
                     raise RobotError(
                         f"no tag of the cell is seen for {self._patience:g} s: see light, camera and localizer"
                     )
                 self._news.wait(0.1)
 
+    def _forget(self) -> None:
+        with self._news:
+            self._known, self._stamp = None, -math.inf
+
     def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
+        if message.header.stamp.to_sec() > rospy.get_time() + AHEAD:
+            rospy.logwarn_throttle(10.0, "cell_pose ignored: its stamp is in the future: see the clocks of the hosts")
+            return
         base = self._odometry.at(message.header.stamp)
         if base is None:
             return

@@ -19,9 +19,11 @@ from control_msgs.msg import (
 )
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Point, PoseStamped
+from metacontrol_bags import ownership
 from nav_msgs.msg import Path
 from node_kit.ros.action_server import wait_for_server
 from node_kit.ros.goals import send_and_wait
+from node_kit.ros.patience import Patience
 from pybullet_simulator.messages.arms import FINGERS, joint_names
 from pybullet_simulator.messages.cell import ImageError, read_floats
 from pybullet_simulator.robot.manipulator import ARMS
@@ -149,8 +151,8 @@ class RosRobot:
             clients.cancel()
         wait(self._begun)
         self._begun.clear()
-        until, before = rospy.get_time() + _BRAKING, self.joints
-        while rospy.get_time() < until and not rospy.is_shutdown():
+        time_left, before = Patience(_BRAKING), self.joints
+        while not time_left.is_over() and not rospy.is_shutdown():
             rospy.sleep(_LOOK)
             now = self.joints
             if all(abs(a - b) < _STANDING for arm in now for a, b in zip(now[arm], before[arm], strict=True)):
@@ -208,17 +210,18 @@ class RosRobot:
                     self._news.notify_all()
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
-        for status in message.status:
+        publisher = message._connection_header.get("callerid", "")
+        for status in ownership.own(message.status, rospy.get_namespace(), publisher):
             arm, _, task = status.name.lstrip("/").partition("_arm: ")
             if task == "safety" and arm in self._arms:
                 (self._stopped.add if status.level == DiagnosticStatus.ERROR else self._stopped.discard)(arm)
 
     def _wait(self, condition: Callable[[], bool], problem: str) -> None:
         """Wait in ROS time for something that a callback tells."""
-        end = rospy.get_time() + _PATIENCE
+        patience = Patience(_PATIENCE)
         with self._news:
             while not condition():
-                if rospy.is_shutdown() or rospy.get_time() > end:
+                if rospy.is_shutdown() or patience.is_over():
                     raise RobotError(f"{problem} for {_PATIENCE:g} s: see whether its driver runs")
                 self._news.wait(0.1)
 

@@ -45,7 +45,9 @@ class TagLocalizer:
         parameters = ParameterTree(rospy.get_param("~", {}), rospy.get_name())
         self._camera_node = parameters.text("camera", "camera")
         self._odometry = BaseOdometry()
-        self._tracker = CellTracker(at_home(home_of(parameters)))
+        self._home = home_of(parameters)
+        self._begin()
+        self._odometry.when_set_back(self._begin)
         self._camera: Camera | None = None
         self._with_tags: deque[bool] = deque(maxlen=_SHARE_OF)
         self._wanted: dict[str, float] = {}
@@ -84,6 +86,9 @@ class TagLocalizer:
 
     # Callbacks
 
+    def _begin(self) -> None:
+        self._tracker = CellTracker(at_home(self._home))
+
     def _on_settings(self, config: TagLocalizerConfig, _level: int) -> TagLocalizerConfig:
         self._wanted = {"exposure": config["exposure"], "gain": config["gain"]}
         self._with_tags.clear()  # what was not seen with other settings says nothing of these
@@ -102,18 +107,19 @@ class TagLocalizer:
             rospy.logwarn_throttle(10.0, f"camera/camera_info ignored: {error}")
 
     def _on_image(self, image: Image) -> None:
+        tracker = self._tracker
         base = self._odometry.at(image.header.stamp)
         if self._camera is None or base is None:
             return
         try:
-            view = self._tracker.look(read_pixels(image), self._camera, base)
+            view = tracker.look(read_pixels(image), self._camera, base)
         except RobotError as error:
             rospy.logwarn_throttle(10.0, f"camera/image_raw ignored: {error}")
             return
         self._with_tags.append(view is not None)
         self._share.publish(sum(self._with_tags) / len(self._with_tags))
         self._markers.publish(_markers(view.cell if view else None, view.ids if view else (), image.header.stamp))
-        known = self._tracker.known
+        known = tracker.known
         if view is None or known is None:
             return
         detection = PoseStamped(pose=_message(view.cell))

@@ -61,10 +61,17 @@ class BatteryLoadControlNode:
             self._meter.add_command()
 
     def _on_tick(self, _event: rospy.timer.TimerEvent) -> None:
-        with self._lock:
-            load = self._meter.tick(rospy.get_time())
-        if load is not None:
-            self._load.publish(load)
+        """Publish the load (called by rospy, whose timer an error would end for good)."""
+        try:
+            with self._lock:
+                load = self._meter.tick(rospy.get_time())
+            if load is not None:
+                self._load.publish(load)
+        except PowerError as error:
+            rospy.logwarn_throttle(10.0, f"no power load: {error}")
+        except rospy.ROSException as error:  # the topic is closed while the node ends
+            if not rospy.core.is_shutdown_requested():
+                rospy.logwarn_throttle(10.0, f"power_load is not published: {error}")
 
     def _on_increase_consumption(self, request: IncreaseConsumptionFactorRequest) -> IncreaseConsumptionFactorResponse:
         try:

@@ -12,6 +12,8 @@ from typing import Any
 
 import rospy
 
+from node_kit.ros.patience import Patience
+
 _DONE = 7  # actionlib.CommState.DONE
 _LOOK_PERIOD = 0.05  # s, wall, between two looks at the ROS clock
 
@@ -34,9 +36,9 @@ def send_and_wait(client: Any, goal: Any, patience_s: float) -> Any:
             ended.set()
 
     handle = client.send_goal(goal, transition_cb=look)
-    end = rospy.get_time() + patience_s
+    patience = Patience(patience_s)
     while not ended.wait(_LOOK_PERIOD):
-        if rospy.is_shutdown() or rospy.get_time() > end:
+        if rospy.is_shutdown() or patience.is_over():
             handle.cancel()
             return None
     return handle

@@ -170,7 +170,7 @@ class Simulation:
         """Multiply the true power load from now on.
 
         Raises:
-            PowerError: the factor is negative or not finite.
+            PowerError: the factor is negative, not finite or far too large.
         """
         self._meter.factor = check_factor(factor)
 

@@ -48,6 +48,8 @@ class Outcome(Enum):
     """A joint has fallen behind by more than the path's tolerance."""
     NOT_REACHED = auto()
     """A joint is not at the goal in time."""
+    SET_BACK = auto()
+    """The clock was set back to before the trajectory began."""
 
 
 class TrajectoryError(ValueError):
@@ -234,6 +236,9 @@ class ArmController:
         if trajectory is None:
             return None
         elapsed = now - self._began
+        if elapsed < 0.0:
+            self.cancel(positions)
+            return Outcome.SET_BACK
         self._target = trajectory.at(elapsed)
         if not self._is_going_back:
             self._remember(self._target)

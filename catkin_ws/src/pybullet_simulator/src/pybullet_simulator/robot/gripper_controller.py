@@ -72,6 +72,7 @@ class GripperController:
             self.width = width
         if abs(width - self._last) > _STILL:
             self._last, self._still_since = width, now
+        self._still_since = min(self._still_since, now)  # the clock may be set back
         if not self._waits:
             return None
         reached = abs(width - self.width) <= WIDTH_TOLERANCE

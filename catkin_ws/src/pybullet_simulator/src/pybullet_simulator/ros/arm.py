@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from typing import TYPE_CHECKING
 
 import actionlib
@@ -35,17 +36,21 @@ _SECONDS = 1 << 32
 """Nanoseconds of more than a second may make more seconds of a stamp than it has room for."""
 _REPORT = 0.5
 """s of ROS time between two reports on /diagnostics; a change is reported at once."""
+_SILENCE = 5.0
+"""s, wall, in which a new state must come while the arm goes back; a slow simulation takes less for one."""
 _CODES = {
     Outcome.DONE: FollowJointTrajectoryResult.SUCCESSFUL,
     Outcome.STOPPED: FollowJointTrajectoryResult.PATH_TOLERANCE_VIOLATED,
     Outcome.BEHIND: FollowJointTrajectoryResult.PATH_TOLERANCE_VIOLATED,
     Outcome.NOT_REACHED: FollowJointTrajectoryResult.GOAL_TOLERANCE_VIOLATED,
+    Outcome.SET_BACK: FollowJointTrajectoryResult.PATH_TOLERANCE_VIOLATED,
 }
 _WORDS = {
     Outcome.DONE: "the goal is reached",
     Outcome.STOPPED: "safety stop",
     Outcome.BEHIND: "a joint has fallen behind its path",
     Outcome.NOT_REACHED: "a joint is not at its goal in time",
+    Outcome.SET_BACK: "the clock was set back; the arm stays where it is",
 }
 
 
@@ -91,6 +96,9 @@ class ArmNode:
             "~gripper_command", GripperCommandAction, self._on_grip, self._on_cancel, auto_start=False
         )
         self._input = rospy.Subscriber(f"{raw}/state", ArmState, self._on_state, queue_size=1, tcp_nodelay=True)
+        # They hold their lock while they call back, and want it for each answer: with two locks, threads that come from
+        # both sides would wait for each other for ever.
+        self._motions.lock = self._grips.lock = self._lock
         self._motions.start()
         self._grips.start()
 
@@ -157,11 +165,11 @@ class ArmNode:
 
     def _on_cancel(self, goal: ServerGoalHandle) -> None:
         with self._lock:
-            if goal == self._motion and self._state is not None:
+            if self._motion is not None and goal == self._motion and self._state is not None:
                 self._controller.cancel(self._state.positions)
                 goal.set_canceled(FollowJointTrajectoryResult(), "cancelled; the arm stays where it is")
                 self._motion = None
-            elif goal == self._grip:
+            elif self._grip is not None and goal == self._grip:
                 goal.set_canceled(GripperCommandResult(), "cancelled; the fingers keep their target")
                 self._grip = None
 
@@ -181,8 +189,16 @@ class ArmNode:
             problem = self._controller.go_back(self._state.stamp.to_sec(), self._state.positions)
             if problem:
                 return TriggerResponse(False, problem)
+            stamp, since = self._state.stamp, time.monotonic()
             while self._controller.is_moving and not rospy.is_shutdown():
                 self._ended.wait(0.1)
+                if self._state.stamp != stamp:
+                    stamp, since = self._state.stamp, time.monotonic()
+                elif time.monotonic() - since > _SILENCE:
+                    self._controller.cancel(self._state.positions)
+                    topic = rospy.resolve_name(f"simulator/{self._arm}_arm/state")
+                    text = f"nothing new comes on {topic} for {_SILENCE:g} s: see whether the simulator runs"
+                    return TriggerResponse(False, text)
             outcome = self._last_outcome
         return TriggerResponse(outcome is Outcome.DONE, _WORDS[outcome] if outcome else "the node ends")
 
@@ -215,7 +231,10 @@ class ArmNode:
         if stopped == self._was_stopped and 0.0 <= now - self._reported < _REPORT:
             return
         self._was_stopped, self._reported = stopped, now
-        status = DiagnosticStatus(DiagnosticStatus.OK, f"{self._arm}_arm: safety", "works", f"{self._arm}_arm", [])
+        # On a master of several robots, the hardware_id says whose arm it is: see the README of rosgraph_monitor.
+        robot = rospy.get_namespace()
+        hardware_id = f"{self._arm}_arm" if robot == "/" else f"robot:{robot.rstrip('/')}"
+        status = DiagnosticStatus(DiagnosticStatus.OK, f"{self._arm}_arm: safety", "works", hardware_id, [])
         if stopped:
             status.level = DiagnosticStatus.ERROR
             status.message = "safety stop: the arm met resistance; take away what it met, then call ~release"
