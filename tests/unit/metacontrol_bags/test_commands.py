@@ -105,6 +105,17 @@ def test_bag_of_a_killed_recorder_tells_what_it_has(unfinished):
     assert summary["outcome"] == "unknown"
 
 
+@pytest.mark.parametrize("command", ["metrics", "compare"])
+def test_bag_without_configurations_tells_the_rest(path, mission_bag, tmp_path, command):
+    topic = "/rosgraph_manipulator/active_configuration"
+    mission_bag.messages = [entry for entry in mission_bag.messages if entry[1] != topic]
+    result = call(command, path, mission_bag.write(tmp_path / "none.bag"), "--json")
+    assert result.exit_code == 0
+    one_line(result, "none.bag", f"has no {topic}")
+    with_them, without = json.loads(result.stdout)
+    assert with_them["adaptation"]["configurations"] and without["adaptation"]["configurations"] == {}
+
+
 def test_bag_of_something_else_is_no_record_of_a_mission(foreign):
     with pytest.raises(BagError, match=r"foreign\.bag: holds nothing of a mission, only "):
         read_record(foreign)

@@ -195,12 +195,43 @@ def test_summary_tells_where_clutter_lay():
 
 @pytest.mark.parametrize(
     ("kind", "values", "said"),
-    [("MISSION_START", {"seed": "one"}, "seed is 'one'"), ("PERTURBATION", {"places": "here"}, "places is 'here'")],
+    [
+        ("MISSION_START", {"seed": "one"}, "seed is 'one'"),
+        ("PERTURBATION", {"places": "here"}, "places is 'here'"),
+        ("PERTURBATION", {"places": "nan,1"}, "places is 'nan,1'"),
+        ("PERTURBATION", {"places": "1,2,3"}, "places is '1,2,3'"),
+        *(
+            (kind, {key: text}, f"{key} is '{text}'; expected a finite number")
+            for kind, keys in (
+                ("MISSION_START", ("seed", "clutter", "power_factor", "controller_hz", "nfr_safety")),
+                ("MISSION_END", ("wall_duration_s",)),
+                ("PERTURBATION", ("pid", "share")),
+            )
+            for key in keys
+            for text in ("inf", "nan", "1e308")
+        ),
+    ],
 )
 def test_nonsense_in_an_event_is_named(kind, values, said):
     record = MissionRecord(events=(Event(1.0, kind, "r1", values),))
     with pytest.raises(MetricsError, match=said):
         summarise(record)
+
+
+def test_figure_beyond_all_numbers_is_not_known():
+    ended = Event(9.0, "MISSION_END", "r1", {"wall_duration_s": "5e-324"})
+    summary = summarise(MissionRecord(events=(Event(1.0, "MISSION_START", "r1"), ended)))
+    assert summary["real_time_factor"] is None
+    assert json.dumps(summary, allow_nan=False)
+
+
+def test_what_is_farther_than_the_earth_is_large_is_no_place(mission_bag, tmp_path):
+    expected = summarise(read_record(mission_bag.write(tmp_path / "mission.bag")))
+    mission_bag.pose(16.2, 1e308, 0.0)
+    mission_bag.obstacles(9.0, (0.0, -1e308))
+    record = read_record(mission_bag.write(tmp_path / "far.bag"))
+    assert summarise(record) == expected
+    assert record.obstacles == ()
 
 
 @pytest.mark.parametrize("content", [b"", b"no bag at all", b"#ROSBAG V2.0\n" + bytes(100)])

@@ -43,3 +43,12 @@ def test_decision_tells_analysis_and_plan():
     analysis, plan = Timeline({}).tell(report)
     assert (analysis.step, analysis.text) == ("R2", "o_navigate is violated by qa:energy")
     assert (plan.step, plan.text) == ("R3", "a -> b, degraded")
+
+
+def test_share_of_the_way_is_shown_as_told_where_it_is_no_number():
+    def told(share):
+        (entry,) = Timeline({}).tell(Event(1.0, "PERTURBATION", "clutter:1", {"share": share}))
+        return entry.text
+
+    assert told("0.25") == "injected: clutter:1 after 25% of the way"
+    assert told("half") == "injected: clutter:1 after half of the way"

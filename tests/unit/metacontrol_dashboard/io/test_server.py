@@ -4,6 +4,7 @@ import asyncio
 import json
 import threading
 from contextlib import asynccontextmanager
+from functools import partial
 
 import pytest
 from aiohttp.test_utils import TestClient, TestServer
@@ -195,6 +196,28 @@ def test_nonsense_is_refused(body):
 
 
 @pytest.mark.parametrize(
+    ("headers", "body"),
+    [
+        ({"Host": "["}, "{}"),
+        ({"Origin": "http://["}, "{}"),
+        ({}, "[" * 90_000),
+        ({}, b'"\xff"'),
+        ({"Content-Type": "application/json; charset=foo"}, "{}"),
+    ],
+)
+def test_request_that_can_not_be_read_is_refused_in_one_line(headers, body):
+    async def test():
+        async with served() as client:
+            headers_of_json = {"Content-Type": "application/json"} | headers
+            answer = await client.post("/api/act", data=body, headers=headers_of_json)
+            assert (answer.status, client.asked.requests) == (400, [])
+            assert (await answer.text()).count("\n") == 1
+            assert "Content-Security-Policy" in answer.headers
+
+    run(test)
+
+
+@pytest.mark.parametrize(
     "path", ["/../../etc/passwd", "/..%2f..%2fetc%2fpasswd", "/etc/passwd", "/server.py", "/%00", "/main.js/"]
 )
 def test_no_other_file_is_served(path):
@@ -239,6 +262,77 @@ def test_runs_are_offered_and_read_when_they_are_asked_for():
             assert (await client.post("/api/act", json={"action": "pause"})).status == 404
 
     run(test)
+
+
+def test_token_that_is_no_utf_8_is_refused():
+    async def test():
+        async with served() as client:
+            body = b'{"action": "pause"}'
+            reader, writer = await asyncio.open_connection(client.host, client.port)
+            head = f"Host: localhost\r\nContent-Type: application/json\r\nContent-Length: {len(body)}\r\n".encode()
+            end = b"X-Token: \xff\xfe\r\nConnection: close\r\n\r\n"
+            writer.write(b"POST /api/act HTTP/1.1\r\n" + head + end + body)
+            answer = await reader.read()
+            writer.close()
+            assert b" 400 " in answer.splitlines()[0] and answer.endswith(b"X-Token is no UTF-8\n")
+            assert not client.asked.requests
+
+    run(test)
+
+
+def test_page_of_a_run_that_can_not_be_made_is_told():
+    def refuse():
+        raise ValueError("the page is not built")
+
+    async def test():
+        content = Content(FILES, runs={"a": lambda: Run(b"{}", refuse, lambda limits: [])})
+        async with served(content=content) as client:
+            answer = await client.get("/api/runs/a/page")
+            assert (answer.status, await answer.text()) == (422, "the page is not built\n")
+
+    run(test)
+
+
+def test_run_that_is_open_is_told_while_another_one_is_opened():
+    begun, go_on = threading.Event(), threading.Event()
+    told = Run(b"{}", lambda: "", lambda limits: [])
+
+    def slow():
+        begun.set()
+        assert go_on.wait(DEADLINE_S)
+        return told
+
+    async def test():
+        async with served(content=Content(FILES, runs={"open": lambda: told, "slow": slow})) as client:
+            await client.get("/api/runs/open")
+            waiting = asyncio.create_task(client.get("/api/runs/slow"))
+            try:
+                await asyncio.get_running_loop().run_in_executor(None, begun.wait, DEADLINE_S)
+                answer = await asyncio.wait_for(client.get("/api/runs/open"), DEADLINE_S / 2)
+                assert (answer.status, waiting.done()) == (200, False)
+            finally:
+                go_on.set()
+            assert (await waiting).status == 200
+
+    run(test)
+
+
+def test_only_the_last_runs_are_kept():
+    opened = []
+
+    def open_run(name):
+        opened.append(name)
+        return Run(name.encode(), lambda: "", lambda limits: [])
+
+    names = [str(number) for number in range(9)]
+
+    async def test():
+        async with served(content=Content(FILES, runs={name: partial(open_run, name) for name in names})) as client:
+            for name in [*names[:8], "0", "8", "0", "1"]:
+                assert await (await client.get(f"/api/runs/{name}")).text() == name
+
+    run(test)
+    assert opened == [*names, "1"]
 
 
 def test_bag_that_can_not_be_read_is_told():

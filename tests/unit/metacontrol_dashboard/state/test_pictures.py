@@ -92,6 +92,11 @@ def test_wide_image_is_made_smaller():
     assert seen(image("mono8", np.full((480, 640, 1), 7, np.uint8))).shape == (240, 320, 3)
 
 
+def test_high_image_is_made_smaller():
+    assert seen(image("mono8", np.full((70_000, 1, 1), 7, np.uint8))).shape == (640, 1, 3)
+    assert seen(image("mono8", np.full((1280, 320, 1), 7, np.uint8))).shape == (640, 160, 3)
+
+
 def test_compressed_image():
     data = cv2.imencode(".png", whole(ORANGE[::-1]))[1].tobytes()
     assert np.abs(seen(Thing(format="png", data=data)) - ORANGE).max() < 12

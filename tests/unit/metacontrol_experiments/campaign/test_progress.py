@@ -1,5 +1,6 @@
 """What is still to do in a campaign, and what its table says."""
 
+import json
 from dataclasses import replace
 
 import pytest
@@ -47,6 +48,45 @@ def test_result_survives_its_file_but_for_the_logs():
     assert "Traceback" not in to_json(result)
 
 
+def changed(*keys, to):
+    """Return the text of a result's file in which one value is another one."""
+    content = json.loads(to_json(Result(RUN, (DONE,), SUMMARY | {"collisions": 0, "mean_qa": {}}, {"host": "a"})))
+    part = content
+    for key in keys[:-1]:
+        part = part[key]
+    part[keys[-1]] = to
+    return json.dumps(content)
+
+
+@pytest.mark.parametrize(
+    ("keys", "to", "place"),
+    [
+        (("summary",), [1], "summary: is"),
+        (("summary",), "x", "summary: is"),
+        (("summary",), None, "summary: is missing"),
+        (("summary",), {"outcome": "reached"}, "summary.reconfigurations: is missing"),
+        (("summary", "reconfigurations"), None, "summary.reconfigurations: is empty"),
+        (("summary", "mean_qa"), None, "summary.mean_qa: is empty"),
+        (("summary", "mean_qa"), {"safety": "low"}, "summary.mean_qa.safety: is 'low'"),
+        (("summary", "duration_s"), "x", "summary.duration_s: is 'x'"),
+        (("summary", "duration_s"), float("nan"), "summary.duration_s: is 'nan'"),
+        (("summary", "collisions"), 10**400, "summary.collisions: is '1000"),
+        (("summary", "outcome"), "\ud800", "surrogates not allowed"),
+        (("provenance",), None, "provenance: is empty"),
+        (("provenance", "host"), [1], "provenance.host: is"),
+        (("attempts", 0, "wall_s"), None, r"attempts\[0\].wall_s: is empty"),
+        (("attempts", 0, "wall_s"), "x", r"attempts\[0\].wall_s: is 'x'"),
+        (("attempts", 0, "problem"), {"a": 1}, r"attempts\[0\].problem: is"),
+        (("run", "clutter"), True, "run.clutter: is"),
+        (("run", "seed"), 2**64, "run.seed: is"),
+        (("run", "contingencies"), [1], r"run.contingencies\[0\]: is"),
+    ],
+)
+def test_result_that_no_table_can_hold_is_refused_by_its_place(keys, to, place):
+    with pytest.raises(CampaignError, match=rf"^x\.json: is no result of a run .*{place}.*delete it"):
+        from_json(changed(*keys, to=to), "x.json")
+
+
 @pytest.mark.parametrize("text", ["", "{}", "[]", "[" * 9999, to_json(Result(RUN, (DONE,)))[:-9], '{"run": {}}'])
 def test_file_that_is_no_result_is_refused(text):
     with pytest.raises(CampaignError, match=r"^x\.json: is no result of a run .*delete it"):
@@ -75,7 +115,13 @@ def test_row_of_a_time_before_the_spares_is_of_a_mission_without_them():
         check_same([replace(RUN, spares=True)], {RUN.name: from_row(told, "x")}, "out", "delete it")
 
 
-@pytest.mark.parametrize("change", [{"summary": "{"}, {"status": "gone"}, {"attempts": None}, {"contingencies": 3}])
+@pytest.mark.parametrize(
+    "change",
+    [
+        *({"summary": "{"}, {"status": "gone"}, {"attempts": None}, {"attempts": float("inf")}, {"contingencies": 3}),
+        *({"summary": "[1]"}, {"summary": "{}"}, {"summary": None}, {"wall_s": None}, {"wall_s": "x"}, {"host": 1}),
+    ],
+)
 def test_row_that_is_no_result_is_refused(change):
     told = {**row(Result(RUN, (DONE,), SUMMARY)), **change}
     with pytest.raises(CampaignError, match=r"^x\.parquet: row 1: is no result of a run .*name a table"):

@@ -32,3 +32,7 @@ def test_what_is_over_before_the_mission_or_begins_after_it_is_not_shown():
 def test_change_is_a_span_of_its_own():
     asked = record((5.0, [("pick", "one", "STABLE")]), (20.0, [("pick", "two", "RECONFIGURING")]))
     assert [state for *_, state in shown(asked, "pick")] == ["STABLE", "RECONFIGURING"]
+
+
+def test_record_without_groundings_shows_none():
+    assert shown(record(), "pick") == []

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from metacontrol_bags.decision import DECIDED, EXECUTED, Decision
+from metacontrol_bags.metrics import MetricsError
 from metacontrol_bags.record import Event, GoalReport, MissionRecord
 from metacontrol_bags.words import MissionEvent
 from metacontrol_experiments.pyramid.record import PyramidRecord, Stop
@@ -136,3 +137,9 @@ def test_obstacle_that_no_arm_has_met_is_no_cause():
 
 def test_distance_is_that_of_the_nearest_block():
     assert placed(BUILT[::-1, :3]) == pytest.approx(np.zeros(6))
+
+
+@pytest.mark.parametrize("seed", ["inf", "many"])
+def test_impossible_number_of_an_event_is_named(seed):
+    with pytest.raises(MetricsError, match=f"seed is '{seed}'"):
+        summarise_pyramid(record(told={"seed": seed}))

@@ -15,12 +15,13 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from metacontrol_bags.decision import DECIDED, EXECUTED, FAILED
-from metacontrol_bags.metrics import reconfigurations
+from metacontrol_bags.metrics import reconfigurations, rounded
 from metacontrol_bags.series import held, mean_of
 from metacontrol_bags.words import DiagnosticWords, FunctionGrounding, MissionEvent
 
@@ -79,7 +80,7 @@ def _configurations(record: MissionRecord, start: float, end: float) -> dict[str
     """Return by function and configuration for how long it was deployed, s. Each message tells of all functions."""
     found: dict[str, dict[str, dict[str, float]]] = {}
     stamps = sorted({report.stamp for report in record.configurations})
-    until = dict(zip(stamps, [*stamps[1:], end], strict=True))
+    until = dict(pairwise([*stamps, end]))
     last = {(report.function, report.stamp): report for report in record.configurations}  # of one moment
     for report in last.values():
         duration = min(until[report.stamp], end) - max(report.stamp, start)
@@ -105,9 +106,8 @@ def _qualities(record: MissionRecord, start: float, end: float) -> dict[str, dic
         if limit is not None:
             beyond = levels > limit if side == "above" else levels < limit
             violated = round(float(durations[beyond & fresh].sum()), 4)
-        mean = mean_of(levels[fresh], durations[fresh])
         found[name] = {
-            "mean": None if mean is None else round(mean, 4),
+            "mean": rounded(mean_of(levels[fresh], durations[fresh])),
             "limit": limit,
             "violated": side,
             "violated_s": violated,

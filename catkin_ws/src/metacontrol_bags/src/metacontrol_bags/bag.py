@@ -18,6 +18,7 @@ from metacontrol_bags.bag_file import BagError, BagFile
 from metacontrol_bags.decoding import decode
 from metacontrol_bags.gaps import is_mission, nothing_of_a_mission
 from metacontrol_bags.record import (
+    FARTHEST_M,
     ComponentReport,
     CostReport,
     MissionRecord,
@@ -211,7 +212,7 @@ class _Builder:
 
 def _pose(received: float, message: Any, _publisher: str) -> list[tuple[float, float, float]]:
     position = message.pose.pose.position
-    if not (math.isfinite(position.x) and math.isfinite(position.y)):
+    if not _is_place(position):
         return []
     return [(messages.header_stamp(message.header, received), position.x, position.y)]
 
@@ -223,15 +224,20 @@ def _sample(received: float, message: Any, _publisher: str) -> list[tuple[float,
 def _obstacles(_received: float, message: Any, _publisher: str) -> Iterator[tuple[str, float, float]]:
     for marker in message.markers:
         place = marker.pose.position
-        if marker.action == 0 and marker.type == _CUBE and math.isfinite(place.x) and math.isfinite(place.y):
+        if marker.action == 0 and marker.type == _CUBE and _is_place(place):
             yield marker.ns, round(place.x, 1), round(place.y, 1)
 
 
 def _map(_received: float, message: Any, _publisher: str) -> list[OccupancyMap]:
     info = message.info
     grid = np.asarray(message.data, dtype=np.int8)
-    if not grid.size or grid.size != info.width * info.height:
+    is_drawn = _is_place(info.origin.position) and 0.0 < info.resolution * max(info.width, info.height) < FARTHEST_M
+    if not grid.size or grid.size != info.width * info.height or not is_drawn:
         return []
     cells = grid.reshape(info.height, info.width) >= _OCCUPIED
     origin = info.origin.position
     return [OccupancyMap(float(info.resolution), origin.x, origin.y, cells)]
+
+
+def _is_place(position: Any) -> bool:
+    return abs(position.x) < FARTHEST_M and abs(position.y) < FARTHEST_M  # nor is NaN

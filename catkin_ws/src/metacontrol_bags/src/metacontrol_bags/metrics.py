@@ -25,6 +25,7 @@ Definitions
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,7 +33,7 @@ import numpy as np
 from metacontrol_bags.decision import DECIDED, EXECUTED, FAILED
 from metacontrol_bags.gaps import holes
 from metacontrol_bags.goal_status import GoalStatus
-from metacontrol_bags.record import MissionRecord, Samples
+from metacontrol_bags.record import FARTHEST_M, MissionRecord, Samples
 from metacontrol_bags.series import held, mean, periods_missed, share_above, start_of_run
 from metacontrol_bags.violations import CELL_M, describe
 from metacontrol_bags.words import DiagnosticWords, FunctionGrounding, MissionEvent
@@ -59,6 +60,9 @@ DEFAULT_THRESHOLDS = {"safety": 0.6, "energy": 0.62}
 MAX_MEAN_SAFETY = 0.4
 MAX_SHARE = {"safety": 0.05, "energy": 0.10}
 """The paper's definition of success: limits of the mean risk and of the shares of time above the thresholds."""
+
+_LARGEST = 1e200
+"""No number of an event is so large: what is made of it stays finite."""
 
 _SAME_MOMENT_S = 0.05
 """Stamps of different nodes may differ by a few periods of `/clock` (0.01 s) for what happened in the same moment."""
@@ -94,21 +98,21 @@ def summarise(record: MissionRecord) -> dict[str, Any]:
         "mission": told.get("mission", "D2"),
         "route": told.get("route", "unknown"),
         "contingency": {
-            "clutter": int(_number(told, "clutter", 0)),
-            "power": _number(told, "power_factor", 1.0),
+            "clutter": int(number(told, "clutter", 0)),
+            "power": number(told, "power_factor", 1.0),
             "component": None if told.get("failure", "none") == "none" else told["failure"],
         },
         "metacontrol": told.get("metacontrol", "true" if record.decisions else "false") == "true",
-        "seed": int(_number(told, "seed", 0)),
+        "seed": int(number(told, "seed", 0)),
         "goal_reached": reached,
         "success": not _unmet(reached, duration, means, above),
-        "duration_s": _rounded(duration),
-        "path_length_m": _rounded(path_length(record, start, end)),
+        "duration_s": rounded(duration),
+        "path_length_m": rounded(path_length(record, start, end)),
         "collisions": _collisions(record.contacts, start, end),
         "initial_configuration": configuration_at(record, start) or told.get("initial_configuration"),
         "final_configuration": configuration_at(record, end) or told.get("initial_configuration"),
-        "time_above_threshold": {name: _rounded(value) for name, value in above.items()},
-        "mean_qa": {name: _rounded(value) for name, value in means.items()},
+        "time_above_threshold": {name: rounded(value) for name, value in above.items()},
+        "mean_qa": {name: rounded(value) for name, value in means.items()},
         "violations": {name: found for name, (found, _) in violated.items()},
         "violation_places": {"cell_m": CELL_M} | {name: cells for name, (_, cells) in violated.items()},
         "reconfigurations": reconfigurations(record, EXECUTED),
@@ -123,8 +127,8 @@ def summarise(record: MissionRecord) -> dict[str, Any]:
         "real_time_factor": _real_time_factor(duration, closing),
         "outcome": closing.get("outcome", "unknown"),
         "reason": closing.get("reason", "the bag holds no end of the mission"),
-        "start_stamp_s": _rounded(start),
-        "unrecorded": [[_rounded(since - start), _rounded(until - start)] for since, until in holes(record)],
+        "start_stamp_s": rounded(start),
+        "unrecorded": [[rounded(since - start), rounded(until - start)] for since, until in holes(record)],
         "thresholds": limits,
         "observed_qa": {name: _observed(record, name, limit, start, end) for name, limit in limits.items()},
     }
@@ -134,7 +138,7 @@ def thresholds(record: MissionRecord) -> dict[str, float]:
     """Return the threshold of each QA: as MISSION_START has it (`nfr_<qa>`), else that of D2."""
     began = record.event(MissionEvent.MISSION_START)
     told = began.values if began else {}
-    return {name: _number(told, f"nfr_{name}", default) for name, default in DEFAULT_THRESHOLDS.items()}
+    return {name: number(told, f"nfr_{name}", default) for name, default in DEFAULT_THRESHOLDS.items()}
 
 
 def mission_goals(record: MissionRecord) -> dict[str, GoalStatus | None]:
@@ -173,10 +177,30 @@ def reconfigurations(record: MissionRecord, state: str) -> list[dict[str, Any]]:
     return [_reconfiguration(record, decided[d.id], d) for d in closed]
 
 
+def rounded(value: float | None) -> Any:
+    """Return a figure as a summary has it; None where it is not known, or beyond all numbers."""
+    return None if value is None or not math.isfinite(value) else round(float(value), 4)
+
+
+def number(values: dict[str, str], key: str, default: float) -> float:
+    """Return a number among an event's values.
+
+    Raises:
+        MetricsError: the value is no number, or none that a mission can have.
+    """
+    try:
+        found = float(values.get(key, default))
+    except ValueError as error:
+        raise MetricsError(f"mission/event: {key} is {values[key]!r}, which is no number") from error
+    if not abs(found) < _LARGEST:  # nor is NaN
+        raise MetricsError(f"mission/event: {key} is {values[key]!r}; expected a finite number, below {_LARGEST:g}")
+    return found
+
+
 def _reconfiguration(record: MissionRecord, decided: Decision, closed: Decision) -> dict[str, Any]:
     caused, reported = _cause(record, decided)
     return {
-        "stamp_s": _rounded(decided.stamp - record.start_stamp),
+        "stamp_s": rounded(decided.stamp - record.start_stamp),
         "trigger": decided.trigger,
         "from": decided.from_configuration,
         "to": decided.to_configuration,
@@ -269,11 +293,11 @@ def _perturbations(record: MissionRecord) -> list[dict[str, Any]]:
     found = []
     for event in record.events:
         if event.kind == MissionEvent.PERTURBATION:
-            entry: dict[str, Any] = {"stamp_s": _rounded(event.stamp - record.start_stamp), "name": event.name}
+            entry: dict[str, Any] = {"stamp_s": rounded(event.stamp - record.start_stamp), "name": event.name}
             if "share" in event.values:
-                entry["share"] = _number(event.values, "share", 0.0)
+                entry["share"] = number(event.values, "share", 0.0)
             if "pid" in event.values:
-                entry["pid"] = int(_number(event.values, "pid", 0))
+                entry["pid"] = int(number(event.values, "pid", 0))
             if "places" in event.values:
                 entry["places"] = _places(event.values["places"])
             found.append(entry)
@@ -287,9 +311,12 @@ def _places(text: str) -> list[list[float]]:
         MetricsError: the text holds no places.
     """
     try:
-        return [[float(number) for number in place.split(",")] for place in text.split()]
-    except ValueError as error:
-        raise MetricsError(f"mission/event: places is {text!r}; expected x,y in m, space between them") from error
+        places = [[float(figure) for figure in place.split(",")] for place in text.split()]
+    except ValueError:
+        places = [[]]
+    if not all(len(place) == 2 and max(map(abs, place)) < FARTHEST_M for place in places):
+        raise MetricsError(f"mission/event: places is {text!r}; expected x,y in m, space between them")
+    return places
 
 
 def _observed(record: MissionRecord, name: str, limit: float, start: float, end: float) -> dict[str, float | None]:
@@ -300,9 +327,9 @@ def _observed(record: MissionRecord, name: str, limit: float, start: float, end:
     stale = np.isnan(values)
     fresh = float(durations[~stale].sum())
     return {
-        "mean": _rounded(float((values[~stale] * durations[~stale]).sum()) / fresh) if fresh > 0 else None,
-        "time_above_threshold": _rounded(float(durations[values > limit].sum()) / fresh) if fresh > 0 else None,
-        "stale_s": _rounded(float(durations[stale].sum())),
+        "mean": rounded(float((values[~stale] * durations[~stale]).sum()) / fresh) if fresh > 0 else None,
+        "time_above_threshold": rounded(float(durations[values > limit].sum()) / fresh) if fresh > 0 else None,
+        "stale_s": rounded(float(durations[stale].sum())),
     }
 
 
@@ -312,10 +339,10 @@ def _control(record: MissionRecord, told: dict[str, str], start: float, end: flo
         r.stamp for r in record.configurations if r.state != FunctionGrounding.STABLE and start <= r.stamp <= end
     ]
     until = min(changes, default=end)
-    rate = _number(told, "controller_hz", 0.0)
+    rate = number(told, "controller_hz", 0.0)
     stamps = [stamp for stamp in record.commands if start <= stamp <= until]
     missed = periods_missed(stamps, rate) if rate > 0.0 else None
-    return {"rate_hz": rate or None, "periods_missed": _rounded(missed)}
+    return {"rate_hz": rate or None, "periods_missed": rounded(missed)}
 
 
 def _cost(record: MissionRecord, start: float, end: float) -> dict[str, dict[str, float | None]]:
@@ -326,34 +353,18 @@ def _cost(record: MissionRecord, start: float, end: float) -> dict[str, dict[str
         cpu = [report.value for report in during if report.node == node and report.figure == "cpu"]
         memory = [report.value for report in during if report.node == node and report.figure == "memory"]
         costs[node] = {
-            "cpu_percent_mean": _rounded(sum(cpu) / len(cpu)) if cpu else None,
-            "memory_mb_max": _rounded(max(memory)) if memory else None,
+            "cpu_percent_mean": rounded(sum(cpu) / len(cpu)) if cpu else None,
+            "memory_mb_max": rounded(max(memory)) if memory else None,
         }
     return costs
 
 
 def _real_time_factor(duration: float, closing: dict[str, str]) -> float | None:
     """Return simulated over wall duration of the mission."""
-    wall = _number(closing, "wall_duration_s", 0.0)
-    return _rounded(duration / wall) if wall > 0 else None
-
-
-def _number(values: dict[str, str], key: str, default: float) -> float:
-    """Return a number among an event's values.
-
-    Raises:
-        MetricsError: the value is no number.
-    """
-    try:
-        return float(values.get(key, default))
-    except ValueError as error:
-        raise MetricsError(f"mission/event: {key} is {values[key]!r}, which is no number") from error
+    wall = number(closing, "wall_duration_s", 0.0)
+    return rounded(duration / wall) if wall > 0 else None
 
 
 def _span(begin: float | None, end: float | None) -> float | None:
     """Return the seconds from one moment to another, not below 0."""
-    return None if begin is None or end is None else _rounded(max(0.0, end - begin))
-
-
-def _rounded(value: float | None) -> Any:
-    return None if value is None else round(float(value), 4)
+    return None if begin is None or end is None else rounded(max(0.0, end - begin))

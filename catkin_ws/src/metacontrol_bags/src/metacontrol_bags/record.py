@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
     from metacontrol_bags.decision import Decision
 
+FARTHEST_M = 4e7
+"""m: the Earth's circumference. What is farther from the origin of its frame is no place of a robot."""
+
 Samples = tuple[tuple[float, float], ...]
 """Pairs (stamp in s, value), in the order of time."""
 

@@ -114,7 +114,7 @@ def _decision(report: Decision) -> tuple[Entry, ...]:
 def _event(report: Event) -> tuple[Entry, ...]:
     values = report.values
     if report.kind == MissionEvent.PERTURBATION:
-        share = f" after {float(values['share']):.0%} of the way" if "share" in values else ""
+        share = f" after {_share(values['share'])} of the way" if "share" in values else ""
         pid = f", pid {values['pid']}: {values.get('how', 'kill')}" if "pid" in values else ""
         return (Entry(report.stamp, "!", f"injected: {report.name}{share}{pid}", True),)
     if report.kind == MissionEvent.MISSION_START:
@@ -122,3 +122,11 @@ def _event(report: Event) -> tuple[Entry, ...]:
         return (Entry(report.stamp, "-", f"goal sent{route}"),)
     outcome = values.get("outcome", "?")
     return (Entry(report.stamp, "-", f"mission over: {values.get('reason') or outcome}", outcome != "reached"),)
+
+
+def _share(text: str) -> str:
+    """Return a share of the way in per cent; as it is told where it is no number."""
+    try:
+        return f"{float(text):.0%}"
+    except ValueError:
+        return text

@@ -13,6 +13,7 @@ import hmac
 import ipaddress
 import json
 import threading
+from collections import OrderedDict
 from collections.abc import Awaitable, Callable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, field
@@ -33,6 +34,7 @@ _PERIOD = 0.1  # s between two messages to a viewer
 _PATIENCE = 10.0  # s for a viewer to take a message; one that does not is given up
 _LARGEST = 100_000  # bytes of a request
 _MOST_VIEWERS = 100
+_MOST_OPEN = 8  # recorded runs that are kept in memory
 _HEADERS = {
     "Content-Security-Policy": "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
     "frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
@@ -206,7 +208,7 @@ class _Handlers:
     def __init__(self, content: Content, access: Access) -> None:
         self._content, self._access = content, access
         self.viewers = Viewers(content.store, content.lock) if content.store else None
-        self._open: dict[str, Run] = {}
+        self._open: OrderedDict[str, Run] = OrderedDict()  # the last used one last
         self._opening = asyncio.Lock()
 
     @web.middleware
@@ -214,8 +216,8 @@ class _Handlers:
         self, request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
     ) -> web.StreamResponse:
         """Refuse requests that come from pages of others, and add the headers of safety."""
-        self._check_origin(request)
         try:
+            self._check_origin(request)
             response = await handler(request)
         except web.HTTPException as error:
             error.headers.update(_HEADERS)
@@ -225,12 +227,14 @@ class _Handlers:
         return response
 
     def _check_origin(self, request: web.Request) -> None:
-        host = request.host
-        name = urlsplit(f"//{host}").hostname or ""
+        host, origin = request.host, request.headers.get("Origin")
+        try:
+            name, origin_host = urlsplit(f"//{host}").hostname or "", urlsplit(origin or "").netloc
+        except ValueError as error:
+            raise web.HTTPBadRequest(text="Host or Origin is no address\n") from error
         if self._access.is_local and not is_loopback(name):
             raise web.HTTPForbidden(text="this server answers to localhost only\n")  # a name that was bound to it
-        origin = request.headers.get("Origin")
-        if origin is not None and urlsplit(origin).netloc != host:
+        if origin is not None and origin_host != host:
             raise web.HTTPForbidden(text="the request comes from the page of somebody else\n")
 
     async def index(self, _request: web.Request) -> web.Response:
@@ -263,7 +267,7 @@ class _Handlers:
         if self._content.act is None:
             raise web.HTTPNotFound(text="no running system is shown here\n")
         asked = read_request_or_refuse(await self._json(request), read_request)
-        if asked.action not in LOOKS_ONLY and not self._access.may_control(request.headers.get("X-Token", "")):
+        if asked.action not in LOOKS_ONLY and not self._access.may_control(_token(request)):
             told = "the token is missing or wrong" if self._may_ever() else "this page can only look"
             return web.json_response({"ok": False, "message": told}, status=403)
         return web.json_response(await self._content.act(asked), dumps=_dumps)
@@ -279,9 +283,12 @@ class _Handlers:
 
     async def export(self, request: web.Request) -> web.Response:
         run = await self._run(request)
-        text = await asyncio.get_running_loop().run_in_executor(None, run.export)
+        try:
+            page = (await asyncio.get_running_loop().run_in_executor(None, run.export)).encode()
+        except Exception as error:  # that there is no built page, for one
+            raise web.HTTPUnprocessableEntity(text=f"{error}\n") from error
         headers = {"Content-Disposition": 'attachment; filename="mission.html"'}
-        return web.Response(text=text, content_type="text/html", headers=headers)
+        return web.Response(body=page, content_type="text/html", charset="utf-8", headers=headers)
 
     async def replay(self, request: web.Request) -> web.Response:
         limits = read_request_or_refuse(await self._json(request), read_limits)
@@ -296,14 +303,20 @@ class _Handlers:
         name = request.match_info["name"]
         if name not in self._content.runs:
             raise web.HTTPNotFound(text="no such run\n")
-        async with self._opening:
-            if name not in self._open:
-                loop = asyncio.get_running_loop()
-                try:
-                    self._open[name] = await loop.run_in_executor(None, self._content.runs[name])
-                except Exception as error:  # as above
-                    raise web.HTTPUnprocessableEntity(text=f"{error}\n") from error
+        if name not in self._open:
+            async with self._opening:  # one at a time: each takes much memory
+                if name not in self._open:
+                    await self._read(name)
+        self._open.move_to_end(name)
         return self._open[name]
+
+    async def _read(self, name: str) -> None:
+        try:
+            self._open[name] = await asyncio.get_running_loop().run_in_executor(None, self._content.runs[name])
+        except Exception as error:  # as above
+            raise web.HTTPUnprocessableEntity(text=f"{error}\n") from error
+        if len(self._open) > _MOST_OPEN:
+            self._open.popitem(last=False)
 
     @staticmethod
     async def _json(request: web.Request) -> Any:
@@ -311,12 +324,26 @@ class _Handlers:
             raise web.HTTPUnsupportedMediaType(text="send JSON\n")
         try:
             return await request.json()
-        except ValueError as error:
+        except (ValueError, LookupError, RecursionError) as error:  # of the text, of its charset, of its depth
             raise web.HTTPBadRequest(text="this is no JSON\n") from error
 
     async def end(self, _app: web.Application) -> None:
         if self.viewers:
             await self.viewers.close()
+
+
+def _token(request: web.Request) -> str:
+    """Return the token that a request gives; empty: none.
+
+    Raises:
+        HTTPBadRequest: it is no UTF-8.
+    """
+    token = request.headers.get("X-Token", "")
+    try:
+        token.encode()
+    except UnicodeEncodeError as error:
+        raise web.HTTPBadRequest(text="X-Token is no UTF-8\n") from error
+    return token
 
 
 def read_request_or_refuse(data: Any, read: Callable[[Any], Any]) -> Any:

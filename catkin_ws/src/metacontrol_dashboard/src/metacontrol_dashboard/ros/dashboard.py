@@ -15,6 +15,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from metacontrol_bags import messages, ownership
 from metacontrol_msgs.msg import ActiveConfiguration, Decision, MissionEvent, ReasonerJournal
 from metacontrol_msgs.srv import LastDecisions
+from node_kit.io.background import in_background
 from node_kit.io.xml_rpc import CallError
 from node_kit.parameters import ParameterError, ParameterTree
 from node_kit.ros.connections import latest
@@ -33,7 +34,7 @@ from metacontrol_dashboard.ros.operator import Operator
 from metacontrol_dashboard.ros.reasoner import ReasonerFollower
 from metacontrol_dashboard.state.feed import Feed
 from metacontrol_dashboard.state.graph import graph_entries
-from metacontrol_dashboard.state.places import CAMERA, COSTMAP, MAP, take_place, topics_of_places
+from metacontrol_dashboard.state.places import CAMERA, COSTMAP, MAP, take_place, topics_of_places, type_of
 from metacontrol_dashboard.state.store import Store
 
 if TYPE_CHECKING:
@@ -98,13 +99,16 @@ class DashboardNode:
 
     def run(self) -> None:
         """Look at the graph again and again, until the node ends."""
-        self._tell_earlier_decisions()
+        in_background(self._tell_earlier_decisions, "earlier decisions")  # a reasoner that hangs never answers
         while not rospy.is_shutdown():
             begin = time.monotonic()
             try:
                 self._look(self._client.snapshot())
             except CallError as error:
                 rospy.logwarn_throttle(30.0, "%s: the graph is not shown", error)
+            except Exception as error:  # whatever a graph or a model has, the next look may do
+                what = " ".join(f"{type(error).__name__}: {error}".split())
+                rospy.logerr_throttle(30.0, "a look at the graph has failed: %s", what)
             time.sleep(max(0.1, _PERIOD - (time.monotonic() - begin)))
 
     def close(self) -> None:
@@ -164,7 +168,7 @@ class DashboardNode:
                 continue
             if known is not None:
                 known.unregister()
-            kind = roslib.message.get_message_class(snapshot.topics[topic].type)
+            kind = roslib.message.get_message_class(type_of(snapshot.topics[topic].type))
             if kind is not None:
                 take = _Sparse(self._on_place, role, kind).take
                 self._places[role] = rospy.Subscriber(topic, rospy.AnyMsg, take, queue_size=1)

@@ -28,10 +28,8 @@ def packed(grid: NDArray[np.int8], resolution: float, x: float, y: float, yaw: f
     """
     step = max(1, math.ceil(max(grid.shape) / _MOST_CELLS))
     if step > 1:  # of the cells that become one, the worst counts
-        rows, columns = (-(-side // step) * step for side in grid.shape)
-        padded = np.full((rows, columns), -1, dtype=np.int8)
-        padded[: grid.shape[0], : grid.shape[1]] = grid
-        grid = padded.reshape(rows // step, step, columns // step, step).max(axis=(1, 3))
+        for axis, side in enumerate(grid.shape):
+            grid = np.maximum.reduceat(grid, range(0, side, step), axis=axis)
     shade = np.digitize(grid, [0, _FREE, _LIKELY, _OCCUPIED]).astype(int).ravel()
     ends = np.flatnonzero(np.diff(shade)) + 1
     starts = np.concatenate(([0], ends))

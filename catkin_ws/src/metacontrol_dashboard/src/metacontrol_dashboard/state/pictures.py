@@ -14,8 +14,8 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-_WIDTH = 320
-"""px; a wider image is made smaller."""
+_WIDTH, _HEIGHT = 320, 640
+"""px; a larger image is made smaller."""
 _QUALITY = 70
 """Of the JPEG, 0 to 100."""
 _FARTHEST = 99.0
@@ -48,9 +48,10 @@ def picture(message: Any) -> str:
         return ""
     if image is None or not image.size:
         return ""
-    if image.shape[1] > _WIDTH:
-        height = max(1, round(image.shape[0] * _WIDTH / image.shape[1]))
-        image = cv2.resize(image, (_WIDTH, height), interpolation=cv2.INTER_AREA)
+    share = min(1.0, _WIDTH / image.shape[1], _HEIGHT / image.shape[0])
+    if share < 1.0:
+        size = [max(1, round(side * share)) for side in (image.shape[1], image.shape[0])]
+        image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
     written, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
     return f"data:image/jpeg;base64,{base64.b64encode(data.tobytes()).decode()}" if written else ""
 

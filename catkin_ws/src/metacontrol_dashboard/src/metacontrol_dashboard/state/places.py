@@ -41,13 +41,18 @@ def topics_of_places(topics: Iterable[tuple[str, str]]) -> dict[str, str]:
         topics: resolved names and types of all topics of the robot.
     """
     found: dict[str, str] = {}
-    known = sorted((name, kind.replace("/msg/", "/")) for name, kind in topics)
+    known = sorted((name, type_of(kind)) for name, kind in topics)
     for role, wanted, ends in _WANTED:
         for end in ends:
             names = [name for name, kind in known if kind == wanted and name.endswith(end)]
             if names and role not in found:
                 found[role] = min(names, key=lambda name: (bool(_NOT_SEEN.search(name)), len(name)))
     return found
+
+
+def type_of(name: str) -> str:
+    """Return the name of a message type as ROS 1 has it: rosbags and bridges to ROS 2 write `package/msg/Type`."""
+    return name.replace("/msg/", "/")
 
 
 def take_place(feed: Feed, role: str, message: Any) -> None:

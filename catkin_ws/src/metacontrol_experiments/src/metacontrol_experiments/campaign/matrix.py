@@ -19,7 +19,7 @@ from metacontrol_experiments.mission.ground import FACTORY, Ground
 from metacontrol_experiments.mission.settings import ENGINES, LOCKSTEP
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Mapping
+    from collections.abc import Collection, Iterator, Mapping, Sequence
 
 DEADLINE_S = 600.0
 """Wall s for a run, by default: a mission in lockstep takes some seconds."""
@@ -101,6 +101,19 @@ _SCHEMA = {
 
 class CampaignError(OneLineError, ValueError):
     """A campaign makes no sense, or its folder is not its own; the message names file, place and remedy."""
+
+
+def refuse_unusable(lines: Sequence[str]) -> None:
+    """Refuse the results that a folder holds and that cannot be used.
+
+    Args:
+        lines: one for each of them, which names its file and what to do.
+
+    Raises:
+        CampaignError: there is one; of several, the message has the first line, and how many more there are.
+    """
+    if lines:
+        raise CampaignError(lines[0] + (f"; so are {len(lines) - 1} more results" if len(lines) > 1 else ""))
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,8 @@ from dataclasses import MISSING, asdict, dataclass, field, fields
 from enum import Enum
 from typing import TYPE_CHECKING, Any
 
+from ros_model.project.schema_check import violations
+
 from metacontrol_experiments.campaign.matrix import CampaignError, Run
 
 if TYPE_CHECKING:
@@ -18,6 +20,53 @@ PROVENANCE = ("commit", "host", "ended", "versions")
 """What a result tells of where it comes from."""
 LONGEST_LOG = 200_000
 """Bytes of an attempt's log that are kept, the last ones."""
+_MOST = 2**53
+"""A table's columns of numbers hold no whole number beyond."""
+
+_TEXT = {"type": "string", "title": "text"}
+_FLAG = {"type": "boolean", "title": "true or false"}
+_NUMBER = {"type": "number", "minimum": -_MOST, "maximum": _MOST, "title": "a number"}
+_WHOLE = {**_NUMBER, "type": "integer", "title": "a whole number"}
+_TEXTS = {"type": "array", "items": _TEXT, "title": "a list of texts"}
+_KINDS = {"str": _TEXT, "int": _WHOLE, "float": _NUMBER, "bool": _FLAG, "tuple[str, ...]": _TEXTS}
+_RUN = {item.name: _KINDS[str(item.type)] for item in fields(Run)}
+
+
+def _maybe(kind: Mapping[str, Any]) -> dict[str, Any]:
+    return {"anyOf": [kind, {"const": None}], "title": f"{kind['title']}, or null"}
+
+
+_LEVELS = {"type": "object", "title": "levels by name", "additionalProperties": _maybe(_NUMBER)}
+_SUMMARY = {
+    "type": "object",
+    "title": "the summary of a mission",
+    "required": ["reconfigurations"],
+    "properties": {
+        "reconfigurations": {"type": "array", "title": "a list"},
+        "time_above_threshold": _LEVELS,
+        "mean_qa": _LEVELS,
+        **dict.fromkeys(("outcome", "final_configuration"), _maybe(_TEXT)),
+        **dict.fromkeys(("success", "goal_reached"), _maybe(_FLAG)),
+        **dict.fromkeys(("duration_s", "path_length_m"), _maybe(_NUMBER)),
+        "collisions": _maybe(_WHOLE),
+    },
+}
+_ATTEMPT = {
+    "type": "object",
+    "title": "an attempt",
+    "required": ["wall_s", "problem"],
+    "properties": {"wall_s": _NUMBER, "problem": _TEXT},
+}
+_SCHEMA = {
+    "type": "object",
+    "properties": {
+        "run": {"type": "object", "title": "a run", "required": list(_RUN), "properties": _RUN},
+        "attempts": {"type": "array", "minItems": 1, "items": _ATTEMPT, "title": "a list of attempts"},
+        "summary": _maybe(_SUMMARY),
+        "provenance": {"type": "object", "title": "texts by name", "additionalProperties": _maybe(_TEXT)},
+    },
+}
+"""What a row of the table needs of a result."""
 
 
 class Status(Enum):
@@ -115,9 +164,7 @@ def from_json(text: str, where: str) -> Result:
         content = json.loads(text)
         run = Run(**{**content["run"], "contingencies": tuple(content["run"]["contingencies"])})
         attempts = tuple(Attempt(**{**told, "status": Status(told["status"])}) for told in content["attempts"])
-        if not attempts:
-            raise ValueError("no attempt")
-        return Result(run, attempts, content["summary"], content["provenance"])
+        return _checked(Result(run, attempts, content["summary"], content["provenance"]))
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
         raise CampaignError(f"{where}: is no result of a run ({error}): delete it to drive the run again") from error
 
@@ -146,9 +193,26 @@ def from_row(content: Mapping[str, Any], where: str) -> Result:
         last = Attempt(Status(content["status"]), content["wall_s"], content["problem"])
         attempts = (*(Attempt(Status.CRASHED, 0.0) for _ in range(before)), last)
         summary = json.loads(content["summary"]) if content["summary"] else None
-        return Result(run, attempts, summary, {name: content[name] for name in PROVENANCE})
-    except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+        return _checked(Result(run, attempts, summary, {name: content[name] for name in PROVENANCE}))
+    except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError) as error:
         raise CampaignError(f"{where}: is no result of a run ({error}): name a table of a campaign") from error
+
+
+def _checked(result: Result) -> Result:
+    """Return a result that a table can hold.
+
+    Raises:
+        ValueError: it is none; the message names the place.
+    """
+    run = {**asdict(result.run), "contingencies": list(result.run.contingencies)}
+    attempts = [{"wall_s": attempt.wall_s, "problem": attempt.problem} for attempt in result.attempts]
+    content = {"run": run, "attempts": attempts, "summary": result.summary, "provenance": result.provenance}
+    for violation in violations(content, _SCHEMA):
+        raise ValueError(str(violation))
+    if result.status is Status.DONE and result.summary is None:
+        raise ValueError("summary: is missing, though the run is done")
+    json.dumps(content, ensure_ascii=False).encode()  # half of a surrogate pair is no text
+    return result
 
 
 def row(result: Result) -> dict[str, Any]:

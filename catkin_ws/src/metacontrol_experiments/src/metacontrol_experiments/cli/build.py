@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 from metacontrol_bags.bag_file import BagError
+from metacontrol_bags.metrics import MetricsError
 from rich.table import Table
 
 from metacontrol_experiments.cli.figure import draw_pyramid_figure
@@ -62,7 +63,7 @@ def build(quiet: bool, output: Path, no_metacontrol: bool, **options: Any) -> No
     Exit status: 0 it stands (where no design is left: the robot has stopped safely and says why), 1 it does not, 2 bad
     input, a system that did not start or a bag that is not whole, 130 interrupted.
     """
-    with refusing(BagError, RunError):
+    with refusing(BagError, MetricsError, RunError):
         settings = PyramidSettings(output, metacontrol=not no_metacontrol, commit=current_commit(), **options)
         with Display(quiet) as display:
             display.say(f"scenario {settings.scenario}: {TITLES[settings.scenario]}")

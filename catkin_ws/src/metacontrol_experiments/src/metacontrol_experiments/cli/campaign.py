@@ -14,7 +14,13 @@ from node_kit.plugins import find
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
-from metacontrol_experiments.campaign.matrix import CampaignError, Known, ground_files, parse_campaign
+from metacontrol_experiments.campaign.matrix import (
+    CampaignError,
+    Known,
+    ground_files,
+    parse_campaign,
+    refuse_unusable,
+)
 from metacontrol_experiments.campaign.progress import Status, check_same, remaining
 from metacontrol_experiments.cli.options import ground_options
 from metacontrol_experiments.cli.pyramid_campaign import drive_pyramids
@@ -87,9 +93,10 @@ def campaign(
         asked = _read(content, file, engine, ground)
         folder.mkdir(parents=True, exist_ok=True)
         with alone_in(folder), signals_as_interrupts():
-            results = _known(asked, folder, tables)
+            results, unusable = _known(asked, folder, tables)
             missing = remaining(asked.runs, results)
             try:
+                refuse_unusable(unusable)
                 _drive(asked, missing, results, folder, jobs, scheduler)
             finally:
                 about = {"campaign": read_text(file), "commit": current_commit()}
@@ -140,11 +147,14 @@ def _read(content: Any, file: Path, engine: str | None, given: dict[str, Path | 
     return asked
 
 
-def _known(asked: Campaign, folder: Path, tables: tuple[Path, ...]) -> dict[str, Result]:
+def _known(asked: Campaign, folder: Path, tables: tuple[Path, ...]) -> tuple[dict[str, Result], tuple[str, ...]]:
     """Return the results that are there, by the run's name: those of the folder, then those of other tables.
 
+    Returns:
+        The results, and a line for each in the folder that cannot be used.
+
     Raises:
-        CampaignError: one cannot be read, or is that of another mission.
+        CampaignError: one is that of another mission, or one of another table cannot be used.
     """
     wanted = {run.name for run in asked.runs}
     found: dict[str, Result] = {}
@@ -152,9 +162,9 @@ def _known(asked: Campaign, folder: Path, tables: tuple[Path, ...]) -> dict[str,
         taken = {name: result for name, result in results_of(table).items() if name in wanted}
         check_same(asked.runs, taken, str(table), "leave out --from")
         found = {**taken, **found}
-    own = read_results(folder, asked.runs)
+    own, unusable = read_results(folder, asked.runs)
     check_same(asked.runs, own, str(folder / RUNS), "name another folder by --output, or delete it")
-    return {**found, **own}
+    return {**found, **own}, unusable
 
 
 def _drive(

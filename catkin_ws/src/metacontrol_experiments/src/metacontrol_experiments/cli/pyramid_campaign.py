@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import shlex
 import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from node_kit.io.input_files import InputFileError, read_text
 from node_kit.io.output_files import write_file
 
-from metacontrol_experiments.campaign.matrix import CampaignError
+from metacontrol_experiments.campaign.matrix import CampaignError, refuse_unusable
 from metacontrol_experiments.campaign.progress import Status
 from metacontrol_experiments.io.campaign_folder import RUNS
 from metacontrol_experiments.io.campaign_on_ros import drive_command
 from metacontrol_experiments.io.display import tell
 from metacontrol_experiments.managers.manager import MROS
 from metacontrol_experiments.mission.settings import BAG_NAME, SUMMARY_NAME
-from metacontrol_experiments.pyramid.campaign import PyramidRun, levels, parse_pyramids, report, rows
+from metacontrol_experiments.pyramid.campaign import PyramidRun, levels, parse_pyramids, read_summary, report, rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -43,19 +43,22 @@ def drive_pyramids(content: Any, file: Path, folder: Path) -> bool:
         folder: of the campaign.
 
     Raises:
-        CampaignError: the file makes no sense, or a summary in the folder can't be read.
+        CampaignError: the file makes no sense, or a summary in the folder can't be used.
     """
     runs = parse_pyramids(content, str(file))
     missing = [run for run in runs if not _summary(folder, run).exists()]
+    _, unusable = _read(folder, runs)
     try:
+        refuse_unusable(unusable)
         for number, run in enumerate(missing, start=1):
             tell(f"{number} of {len(missing)}: {run.name}: {_drive(folder, run)}")
     finally:
-        driven = _read(folder, runs)
+        driven, unusable = _read(folder, runs)
         if driven:
             write_file(folder / REPORT, report(driven))
             _write(folder / TABLE, rows(driven))
             _write(folder / LEVELS, levels(driven))
+    refuse_unusable(unusable)
     tell(f"{len(driven)} of {len(runs)} missions are in {folder / REPORT}")
     if any((folder / RUNS).glob(f"*/{BAG_NAME}")):
         tell(f"the bags that were kept, as a page: metacontrol view {shlex.quote(str(folder / RUNS))}")
@@ -92,13 +95,15 @@ def _drive(folder: Path, run: PyramidRun) -> str:
     return attempt.problem
 
 
-def _read(folder: Path, runs: Iterable[PyramidRun]) -> dict[PyramidRun, dict[str, Any]]:
-    found = {}
+def _read(folder: Path, runs: Iterable[PyramidRun]) -> tuple[dict[PyramidRun, dict[str, Any]], tuple[str, ...]]:
+    """Return the summaries that are there, and a line for each that can't be used."""
+    found: dict[PyramidRun, dict[str, Any]] = {}
+    unusable = []
     for run in runs:
         path = _summary(folder, run)
         if path.exists():
             try:
-                found[run] = json.loads(path.read_bytes())
-            except ValueError as error:
-                raise CampaignError(f"{path}: is no JSON ({error}): delete it, and drive the mission again") from error
-    return found
+                found[run] = read_summary(read_text(path), str(path))
+            except (CampaignError, InputFileError) as error:
+                unusable.append(str(error))
+    return found, tuple(unusable)

@@ -25,21 +25,18 @@ if TYPE_CHECKING:
 RESULT, TABLE, RUNS = "result.json", "results.parquet", "runs"
 
 
-def read_results(folder: Path, runs: Iterable[Run]) -> dict[str, Result]:
-    """Return the results that are there, by the run's name.
-
-    Raises:
-        CampaignError: one of them cannot be read.
-    """
-    found = {}
+def read_results(folder: Path, runs: Iterable[Run]) -> tuple[dict[str, Result], tuple[str, ...]]:
+    """Return the results that are there, by the run's name, and a line for each that cannot be used."""
+    found: dict[str, Result] = {}
+    unusable = []
     for run in runs:
         path = folder / RUNS / run.name / RESULT
         if path.exists():
             try:
                 found[run.name] = from_json(read_text(path), str(path))
-            except InputFileError as error:
-                raise CampaignError(str(error)) from error
-    return found
+            except (CampaignError, InputFileError) as error:
+                unusable.append(str(error))
+    return found, tuple(unusable)
 
 
 def read_table(path: Path) -> pyarrow.Table:

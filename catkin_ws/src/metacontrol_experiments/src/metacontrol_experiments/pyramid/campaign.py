@@ -8,6 +8,8 @@ the design's own, 0 without success.
 
 from __future__ import annotations
 
+import json
+import math
 from dataclasses import dataclass
 from statistics import fmean, median, stdev
 from typing import TYPE_CHECKING, Any
@@ -40,6 +42,19 @@ _SCHEMA = {
             "title": "a list",
         },
         "managers": {"type": "array", "minItems": 1, "items": _MANAGER, "title": "a list"},
+    },
+}
+_TEXT = {"type": "string", "title": "text"}
+_FLAG = {"type": "boolean", "title": "true or false"}
+_NUMBER = {"type": "number", "title": "a number"}
+_NUMBER_OR_NULL = {"anyOf": [_NUMBER, {"const": None}], "title": "a number, or null"}
+_STRIKE = {
+    "type": "object",
+    "title": "a strike",
+    "required": ["name", "recover_s"],
+    "properties": {
+        "name": _TEXT,
+        "recover_s": _NUMBER_OR_NULL,
     },
 }
 _CAUSES = {
@@ -89,20 +104,26 @@ class PyramidRun:
         ]
 
 
-_COLUMNS = (
-    "success",
-    "placed",
-    "duration_s",
-    "placed_error_mm",
-    "moved_mm",
-    "placed_lost",
-    "stands_still",
-    "real_time_factor",
-    "outcome",
-    "reason",
-    "commit",
-)
+_COLUMNS = {
+    "success": _FLAG,
+    "placed": _NUMBER,
+    "duration_s": {**_NUMBER, "minimum": 0, "title": "a number, 0 or more"},
+    "placed_error_mm": _NUMBER,
+    "moved_mm": _NUMBER,
+    "placed_lost": _NUMBER,
+    "stands_still": _FLAG,
+    "real_time_factor": _NUMBER_OR_NULL,
+    "outcome": _TEXT,
+    "reason": _TEXT,
+    "commit": _TEXT,
+}
 """What a table of missions has of each summary."""
+_SUMMARY = {
+    "type": "object",
+    "title": "the summary of a mission",
+    "required": [*_COLUMNS, "strikes"],
+    "properties": {**_COLUMNS, "strikes": {"type": "array", "items": _STRIKE, "title": "a list of strikes"}},
+}
 
 
 def asks_for_pyramids(content: Any) -> bool:
@@ -130,6 +151,22 @@ def parse_pyramids(content: Any, where: str) -> tuple[PyramidRun, ...]:
     )
 
 
+def read_summary(text: str, where: str) -> dict[str, Any]:
+    """Return the summary of a mission, as its file has it.
+
+    Raises:
+        CampaignError: it is none.
+    """
+    try:
+        summary: dict[str, Any] = json.loads(text)
+        for violation in violations(summary, _SUMMARY):
+            raise ValueError(str(violation))
+        json.dumps(summary, ensure_ascii=False).encode()  # half of a surrogate pair is no text
+    except (ValueError, RecursionError) as error:
+        raise CampaignError(f"{where}: is no summary of a mission ({error}): delete it, and drive it again") from error
+    return summary
+
+
 def report(summaries: Mapping[PyramidRun, Mapping[str, Any]]) -> str:
     """Return the tables of a campaign in Markdown: success, duration and accuracy, and how fast it recovers."""
     groups: dict[tuple[int, str, str], list[Mapping[str, Any]]] = {}
@@ -146,11 +183,11 @@ def report(summaries: Mapping[PyramidRun, Mapping[str, Any]]) -> str:
         well = [mission for mission in missions if mission["success"]]
         durations = f"{median(mission['duration_s'] for mission in well):.0f} s" if well else "-"
         error = f"{max(mission['placed_error_mm'] for mission in well):.1f} mm" if well else "-"
-        lost, factor = sum(m["placed_lost"] for m in missions), median(m["real_time_factor"] for m in missions)
+        lost = sum(mission["placed_lost"] for mission in missions)
+        factors = [m["real_time_factor"] for m in missions if m["real_time_factor"] is not None]
+        factor = f"{median(factors):.2f}" if factors else "-"
         title = f"{scenario}: {TITLES[scenario]}" + (f", `{configurations}`" if configurations else "")
-        lines.append(
-            f"| {title} | `{manager}` | {len(missions)} | {met} | {durations} | {error} | {lost} | {factor:.2f} |"
-        )
+        lines.append(f"| {title} | `{manager}` | {len(missions)} | {met} | {durations} | {error} | {lost} | {factor} |")
     adapted = [mission for (_, _, manager), missions in groups.items() if manager == MROS for mission in missions]
     recovered = {what: times for kind, what in _CAUSES.items() if (times := _recoveries(adapted, kind))}
     if recovered:
@@ -190,7 +227,7 @@ def levels(summaries: Mapping[PyramidRun, Mapping[str, Any]]) -> list[dict[str, 
     found = []
     for design, missions in of_design.items():
         well = [mission for _, mission in missions if mission["success"]]
-        shares = [fastest[seed] / mission["duration_s"] if mission["success"] else 0.0 for seed, mission in missions]
+        shares = [fastest[seed] / (m["duration_s"] or math.inf) if m["success"] else 0.0 for seed, m in missions]
         durations = [mission["duration_s"] for mission in well]
         found.append(
             {

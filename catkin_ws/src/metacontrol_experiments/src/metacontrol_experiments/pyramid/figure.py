@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
@@ -135,7 +136,7 @@ def spans(record: PyramidRecord, function: str) -> list[tuple[float, float, Conf
     start, end = record.mission.start_stamp, record.mission.end_stamp
     stamps = [max((report.stamp for report in reports), default=0.0) for reports in record.groundings]
     found = []
-    for reports, stamp, until in zip(record.groundings, stamps, [*stamps[1:], end], strict=True):
+    for reports, (stamp, until) in zip(record.groundings, pairwise([*stamps, end]), strict=True):
         report = next((r for r in reports if r.function == function and r.configuration), None)
         begin = max(stamp, start)
         if report is not None and min(until, end) > begin:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from metacontrol_bags.decision import DECIDED, EXECUTED, FAILED
 from metacontrol_bags.goal_status import GoalStatus
-from metacontrol_bags.metrics import reconfigurations
+from metacontrol_bags.metrics import number, reconfigurations, rounded
 from metacontrol_bags.words import MissionEvent
 from metacontrol_manipulation.pick_place.pyramid import SLOTS
 
@@ -53,7 +53,11 @@ def placed(positions: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def summarise_pyramid(record: PyramidRecord) -> dict[str, Any]:
-    """Return the content of summary.json."""
+    """Return the content of summary.json.
+
+    Raises:
+        MetricsError: an event of the mission says what cannot be.
+    """
     mission = record.mission
     began, ended = mission.event(MissionEvent.MISSION_START), mission.event(MissionEvent.MISSION_END)
     told, closing = began.values if began else {}, ended.values if ended else {}
@@ -72,31 +76,31 @@ def summarise_pyramid(record: PyramidRecord) -> dict[str, Any]:
         "schema_version": SCHEMA_VERSION,
         "commit": told.get("commit", "unknown"),
         "mission": "D1",
-        "scenario": int(told.get("scenario", "0")),
-        "seed": int(told.get("seed", "0")),
+        "scenario": int(number(told, "scenario", 0)),
+        "seed": int(number(told, "seed", 0)),
         "metacontrol": told.get("metacontrol") == "true",
         "success": (is_pyramid and succeeded) if can_be_built else safe,
         "goal_reached": is_pyramid and succeeded,
         "outcome": closing.get("outcome", "unknown"),
         "reason": closing.get("reason", "the bag holds no end of the mission"),
-        "duration_s": _rounded(done - start),
+        "duration_s": rounded(done - start),
         "placed": int((distances <= IN_PLACE).sum()),
-        "placed_error_mm": _rounded(float(distances[distances <= IN_PLACE].max(initial=0.0)) * 1000.0),
-        "moved_mm": _rounded(moved * 1000.0),
+        "placed_error_mm": rounded(float(distances[distances <= IN_PLACE].max(initial=0.0)) * 1000.0),
+        "moved_mm": rounded(moved * 1000.0),
         "placed_lost": lost,
         "stands_still": still,
         "strikes": _strikes(record),
         "reconfigurations": reconfigurations(mission, EXECUTED),
         "reconfigurations_failed": reconfigurations(mission, FAILED),
         "refusals": [
-            {"stamp_s": _rounded(d.stamp - start), "objective": d.objective, "explanation": d.explanation}
+            {"stamp_s": rounded(d.stamp - start), "objective": d.objective, "explanation": d.explanation}
             for d in mission.decisions
             if d.state == FAILED and not d.to_configuration and d.stamp >= start
         ],
         "tags_found": _mean(record.tag_share, start, done),
         "force_max_n": {arm: _largest(rows, start, end) for arm, rows in record.arms.items()},
         "real_time_factor": _factor(end - start, closing),
-        "start_stamp_s": _rounded(start),
+        "start_stamp_s": rounded(start),
     }
 
 
@@ -125,8 +129,8 @@ def _strikes(record: PyramidRecord) -> list[dict[str, Any]]:
         told.append(
             {
                 "name": event.name,
-                "stamp_s": _rounded(event.stamp - start),
-                "cause_s": _rounded(cause - start),
+                "stamp_s": rounded(event.stamp - start),
+                "cause_s": rounded(cause - start),
                 "recover_s": _recovery(record, cause, min(until, cause + _FOLLOWS_S), _triggers(event.name)),
             }
         )
@@ -150,7 +154,7 @@ def _recovery(record: PyramidRecord, cause: float, until: float, triggers: tuple
     if not carried_out:
         return None
     moves = [stamp for stamp in _motions(record) if stamp >= max(carried_out)]
-    return _rounded(min(moves) - cause) if moves else None
+    return rounded(min(moves) - cause) if moves else None
 
 
 def _motions(record: PyramidRecord) -> list[float]:
@@ -191,18 +195,14 @@ def _lost(record: PyramidRecord, start: float) -> int:
 
 def _mean(rows: NDArray[np.float64], start: float, end: float) -> float | None:
     values = rows[(rows[:, 0] >= start) & (rows[:, 0] <= end), 1]
-    return _rounded(float(values.mean())) if len(values) else None
+    return rounded(float(values.mean())) if len(values) else None
 
 
 def _largest(rows: NDArray[np.float64], start: float, end: float) -> float | None:
     values = rows[(rows[:, 0] >= start) & (rows[:, 0] <= end), 2]
-    return _rounded(float(values.max())) if len(values) else None
+    return rounded(float(values.max())) if len(values) else None
 
 
 def _factor(duration: float, closing: dict[str, str]) -> float | None:
-    wall = float(closing.get("wall_duration_s", 0.0))
-    return _rounded(duration / wall) if wall > 0.0 else None
-
-
-def _rounded(value: float) -> float:
-    return round(float(value), 4)
+    wall = number(closing, "wall_duration_s", 0.0)
+    return rounded(duration / wall) if wall > 0.0 else None

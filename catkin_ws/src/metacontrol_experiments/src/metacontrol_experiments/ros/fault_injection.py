@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
 import signal
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-import rosgraph
+import psutil
 import rospy
 from metacontrol_sim.srv import (
     Contingency as ContingencyService,
@@ -17,7 +16,7 @@ from metacontrol_sim.srv import (
     IncreaseConsumptionFactor,
 )
 from nav_msgs.msg import OccupancyGrid
-from node_kit.io.xml_rpc import CallError, Client
+from node_kit.io.xml_rpc import CallError
 from pybullet_simulator.io.fault_signals import SIGNALS
 from pybullet_simulator.messages.grid import GridMessageError, read_grid
 from pybullet_simulator.robot.faults import Fault
@@ -28,6 +27,8 @@ from simulator_msgs.srv import SetLight, SpawnObstacle
 
 from metacontrol_experiments.contingency.contingency import AT_START, InjectionError, Kind
 from metacontrol_experiments.contingency.parsing import ComponentError, ContingencyError, make, node_of
+from metacontrol_experiments.io.node_processes import NodeProcessError, pid_of
+from metacontrol_experiments.ros.services import call
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from metacontrol_experiments.contingency.contingency import Contingency
 
 SERVICE = "contingency/strike"
+_SPAWN = "simulator/spawn_obstacle"
 _SIGNALS = {
     Kind.KILL: signal.SIGKILL,
     Kind.STOP: signal.SIGINT,
@@ -46,7 +48,7 @@ _SIGNALS = {
 }
 _WAIT_S = 10.0
 _CALL_S = 2.0
-"""Wall seconds for a service or the map to be there, and for a call to a node's own API."""
+"""Wall seconds for the map to be there, and for a call to a node's own API."""
 
 
 class Injected(NamedTuple):
@@ -70,7 +72,7 @@ class FaultInjector:
         """
         self._components = components
         self._owns = owns
-        self._pids: dict[str, int] = {}  # of frozen nodes, which no longer tell theirs
+        self._frozen: dict[str, psutil.Process] = {}  # node -> its process, which no longer tells its number
 
     def inject(self, contingency: Contingency, way: tuple[Pose, Pose] | None) -> Injected:
         """Let a contingency happen now; return when it did, and what is worth telling of it.
@@ -86,23 +88,22 @@ class FaultInjector:
             if contingency.kind.hits_component:
                 return self._signal(contingency)
             if contingency.kind is Kind.POWER:
-                return self._call(
-                    "increase_power_consumption", IncreaseConsumptionFactor, factor=f"{contingency.value:g}"
-                )(contingency.value)
+                return _ask("increase_power_consumption", IncreaseConsumptionFactor, contingency.value, "factor")
             if contingency.kind is Kind.LIGHT:
-                return self._call("simulator/set_light", SetLight, light=f"{contingency.value:g}")(contingency.value)
+                return _ask("simulator/set_light", SetLight, contingency.value, "light")
             if contingency.kind is Kind.CLUTTER:
                 return self._clutter(contingency, way)
-        except (CallError, OSError, rospy.ROSException, ValueError) as error:
+        except (CallError, OSError, psutil.Error, rospy.ROSException, ValueError) as error:
             raise InjectionError(f"{contingency}: {' '.join(str(error).split())}") from error
-        except (rospy.ServiceException, ComponentError, ClutterError, GridMessageError) as error:
+        except (rospy.ServiceException, NodeProcessError, ComponentError, ClutterError, GridMessageError) as error:
             raise InjectionError(f"{contingency}: {error}") from error
         raise InjectionError(f"{contingency}: no injector knows contingencies of kind {contingency.kind.value}")
 
     def _signal(self, contingency: Contingency) -> Injected:
         """Send a component's node the signal of a kind."""
         node = rospy.resolve_name(node_of(contingency.target, self._components))
-        pid = self._pids.get(node) or self._pid_of(node)
+        process = self._process_of(node)
+        pid = process.pid
         if not self._owns(pid):
             raise InjectionError(f"{node} (pid {pid}) is not a process that the fault injector may signal")
         number = _SIGNALS[contingency.kind]
@@ -111,20 +112,23 @@ class FaultInjector:
         if contingency.kind is Kind.UNPLUG:
             rospy.set_param(f"{node}/{UNPLUGGED}", True)  # whoever starts the driver again
         stamp = rospy.Time.now()
-        os.kill(pid, number)
+        process.send_signal(number)
         if contingency.kind is Kind.FREEZE:
-            self._pids[node] = pid
+            self._frozen[node] = process
         else:
-            self._pids.pop(node, None)
+            self._frozen.pop(node, None)
         return Injected(stamp, {"node": node, "pid": str(pid), "how": contingency.kind.value})
 
-    def _pid_of(self, node: str) -> int:
-        """Return the process of a node, as its own API tells."""
-        caller = rospy.get_name()
-        with Client(rosgraph.get_master_uri(), caller, _CALL_S) as master:
-            uri = master.call("lookupNode", node)
-        with Client(uri, caller, _CALL_S, peer=f"node {node} at") as api:
-            return int(api.call("getPid"))
+    def _process_of(self, node: str) -> psutil.Process:
+        """Return the process of a node: the one that was frozen, while it lives; else the one that the node tells.
+
+        Raises:
+            CallError, NodeProcessError, psutil.Error: there is none, as far as is seen.
+        """
+        frozen = self._frozen.get(node)
+        if frozen is not None and _lives(frozen) and self._owns(frozen.pid):
+            return frozen
+        return psutil.Process(pid_of(node, rospy.get_name(), _CALL_S))
 
     def _clutter(self, contingency: Contingency, way: tuple[Pose, Pose] | None) -> Injected:
         """Put obstacles on the floor: the listed ones, or random ones off the ends of the way."""
@@ -134,25 +138,37 @@ class FaultInjector:
                 raise InjectionError(f"{contingency}: random places need a pose on amcl_pose; list the places instead")
             grid = read_grid(rospy.wait_for_message("map", OccupancyGrid, _WAIT_S))
             places = scatter(grid, *way, contingency.count, contingency.seed or 0)
-        spawn = self._call("simulator/spawn_obstacle", SpawnObstacle)
+        rospy.wait_for_service(_SPAWN, _WAIT_S)
         stamp = rospy.Time.now()
         for place in places:
-            spawn(x=place.x, y=place.y, yaw=place.yaw)
+            _check(_SPAWN, call(_SPAWN, SpawnObstacle, x=place.x, y=place.y, yaw=place.yaw))
         return Injected(stamp, {"places": " ".join(f"{place.x:.3f},{place.y:.3f}" for place in places)})
 
-    def _call(self, service: str, kind: type, **told: str) -> Callable[..., Injected]:
-        """Return a call of a service that raises where it is refused, and returns its moment and what is told."""
-        rospy.wait_for_service(service, _WAIT_S)
-        proxy = rospy.ServiceProxy(service, kind)
 
-        def call(*arguments: float, **fields: float) -> Injected:
-            stamp = rospy.Time.now()
-            answer = proxy(*arguments, **fields)
-            if not answer.success:
-                raise InjectionError(f"{service} refused: {getattr(answer, 'message', '') or arguments}")
-            return Injected(stamp, told)
+def _ask(service: str, kind: type, value: float, name: str) -> Injected:
+    """Have a service set a value, and tell it by its name.
 
-        return call
+    Raises:
+        InjectionError: the service refuses it.
+        ROSException, ServiceException, OSError: it does not answer.
+    """
+    rospy.wait_for_service(service, _WAIT_S)
+    stamp = rospy.Time.now()
+    _check(service, call(service, kind, value), value)
+    return Injected(stamp, {name: f"{value:g}"})
+
+
+def _check(service: str, answer: Any, *asked: float) -> None:
+    if not answer.success:
+        raise InjectionError(f"{service} refused: {getattr(answer, 'message', '') or asked}")
+
+
+def _lives(process: psutil.Process) -> bool:
+    """Tell whether a process is still there, and not another one with its number."""
+    try:
+        return process.is_running() and process.status() != psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return False
 
 
 def _handles(pid: int, number: int) -> bool:

@@ -10,9 +10,7 @@ import threading
 import time
 from functools import partial
 from typing import TYPE_CHECKING
-from urllib.parse import urlsplit
 
-import rosgraph
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 from metacontrol_bags import ownership
@@ -28,7 +26,7 @@ from mros1_reasoner.loop.requesting import Wanted
 from mros1_reasoner.ros.decisions import DecisionTopic
 from mros1_reasoner.ros.requests import Requests
 from node_kit.io.inbox import Inbox
-from node_kit.io.xml_rpc import CallError, Client
+from node_kit.io.xml_rpc import CallError
 from node_kit.parameters import ParameterError, ParameterTree
 from node_kit.plugins import PluginError
 from node_kit.ros.connections import latest
@@ -37,6 +35,7 @@ from ros_model.errors import ModelError
 
 from metacontrol_experiments.io.driver_processes import DriverError, DriverProcesses
 from metacontrol_experiments.io.input_files import PackageError
+from metacontrol_experiments.io.node_processes import NodeProcessError, pid_of
 from metacontrol_experiments.managers.d2_rules import RuleError
 from metacontrol_experiments.managers.manager import ManagerError, Situation, make_manager
 from metacontrol_experiments.mission.settings import MANAGER_NODE
@@ -222,16 +221,10 @@ class ManagerNode:
 
 
 def _pid_of(node: str) -> int | None:
-    """Return the process of a node on this host, as its own API tells; None where there is no answer."""
-    caller = rospy.get_name()
+    """Return the process of a node on this host; None where there is none, as far as is seen."""
     try:
-        with Client(rosgraph.get_master_uri(), caller, _CALL_S) as master:
-            uri = master.call("lookupNode", node)
-        if not rosgraph.network.is_local_address(urlsplit(uri).hostname):
-            return None
-        with Client(uri, caller, _CALL_S, peer=f"node {node} at") as api:
-            return api.pid()
-    except (CallError, ValueError):
+        return pid_of(node, rospy.get_name(), _CALL_S)
+    except (CallError, NodeProcessError):
         return None
 
 

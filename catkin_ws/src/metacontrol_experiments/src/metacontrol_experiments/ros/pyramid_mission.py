@@ -30,6 +30,7 @@ from metacontrol_experiments.pyramid.summary import IN_PLACE, placed
 from metacontrol_experiments.ros.fault_injection import FaultInjector, Injected
 from metacontrol_experiments.ros.goal import MissionGoal
 from metacontrol_experiments.ros.mission_node import MissionNode
+from metacontrol_experiments.ros.services import call
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -46,8 +47,6 @@ _WALL_SIZE = {"length": 0.3, "width": 0.06, "height": 0.6}
 """m, of the obstacle: higher than an arm carries a block, and too wide to be knocked over."""
 _SAFETY = "_arm: safety"
 _PLACES = re.compile(r"Place\(arm='(\w+)'")
-_CALL_S = 10.0
-"""Wall seconds for a service to be there."""
 _SERVER = "the action server of build"
 
 
@@ -134,7 +133,7 @@ class PyramidMission(MissionNode[State]):
         """Let something happen; what the robot is in the way of, or still holds, is tried again."""
         try:
             injected = self._happen(strike)
-        except (InjectionError, rospy.ROSException, rospy.ServiceException) as error:
+        except (InjectionError, OSError, rospy.ROSException, rospy.ServiceException) as error:
             self._give_up(self._now(), f"{strike} could not happen: {error}", interrupted=False)
             return
         if injected is None:
@@ -146,8 +145,8 @@ class PyramidMission(MissionNode[State]):
 
     def _take_away(self, now: float) -> None:
         try:
-            answer = rospy.ServiceProxy("simulator/delete_obstacle", DeleteObstacle)(_WALL)
-        except (rospy.ROSException, rospy.ServiceException) as error:
+            answer = call("simulator/delete_obstacle", DeleteObstacle, _WALL)
+        except (OSError, rospy.ROSException, rospy.ServiceException) as error:
             self._give_up(now, f"the obstacle could not be taken away: {error}", interrupted=False)
             return
         if not answer.success:
@@ -157,7 +156,7 @@ class PyramidMission(MissionNode[State]):
         """Let something happen; return when, None where it cannot happen yet.
 
         Raises:
-            InjectionError, ROSException, ServiceException: it cannot happen at all.
+            InjectionError, OSError, ROSException, ServiceException: it cannot happen at all.
         """
         what = strike.what
         if isinstance(what, Light):
@@ -166,13 +165,11 @@ class PyramidMission(MissionNode[State]):
             return self._injector.inject(Contingency(Kind.KILL, target=what.component), None)
         stamp = rospy.Time.now()
         if isinstance(what, Release):
-            rospy.wait_for_service(f"{what.arm}_arm/release", _CALL_S)
-            answer = rospy.ServiceProxy(f"{what.arm}_arm/release", Trigger)()
+            answer = call(f"{what.arm}_arm/release", Trigger)
             return Injected(stamp, {"arm": what.arm}) if answer.success else None
-        rospy.wait_for_service("simulator/spawn_obstacle", _CALL_S)
-        spawn = rospy.ServiceProxy("simulator/spawn_obstacle", SpawnObstacle)
         told = {"arm": what.arm, "x": f"{what.x:.3f}", "y": f"{what.y:.3f}"}
-        return Injected(stamp, told) if spawn(name=_WALL, x=what.x, y=what.y, **_WALL_SIZE).success else None
+        spawned = call("simulator/spawn_obstacle", SpawnObstacle, name=_WALL, x=what.x, y=what.y, **_WALL_SIZE)
+        return Injected(stamp, told) if spawned.success else None
 
     # Callbacks: the inbox brings them to the mission's thread
 
