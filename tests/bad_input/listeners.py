@@ -9,6 +9,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
+import genpy
 import numpy as np
 import rospy
 from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
@@ -52,6 +53,7 @@ from metacontrol_msgs.msg import (
 from move_base_msgs.msg import MoveBaseActionGoal, MoveBaseActionResult
 from nav_msgs.msg import OccupancyGrid, Odometry
 from nav_msgs.msg import Path as PathMessage
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import (
     BatteryState,
     CameraInfo,
@@ -82,6 +84,9 @@ if TYPE_CHECKING:
 Good = "list[tuple[str, Any]]"
 _OTHER = 0.3
 """Share of inputs with the messages of a seed in another order, or one of them twice."""
+_CLOCK = "/clock"
+_CLOCK_JUMPS = 0.1
+"""Share of inputs with a message that sets the clock, to any time."""
 
 
 @dataclass(frozen=True)
@@ -115,11 +120,12 @@ def packed(listener: Listener, messages: Sequence[tuple[str, Any]]) -> bytes:
 
 @cache
 def _good(name: str) -> list[tuple[str, Any]]:
-    return next(one for one in LISTENERS if one.name == name).seeds()
+    clock = (_CLOCK, Clock(rospy.Time.from_sec(NOW + 1.0)))
+    return [*next(one for one in LISTENERS if one.name == name).seeds(), clock]
 
 
 def topics_of(listener: Listener) -> list[str]:
-    """Return the topics of a listener's messages; each has its number."""
+    """Return the topics of a listener's messages, and that of the clock; each has its number."""
     return list(dict.fromkeys(topic for topic, _ in _good(listener.name)))
 
 
@@ -131,6 +137,9 @@ def mutated_messages(rng: Random, listener: Listener, seeds: Sequence[bytes]) ->
         rng.shuffle(parts)
         parts = parts[: rng.randrange(1, len(parts) + 1)]
         parts.append(rng.choice(parts))
+    if rng.random() < _CLOCK_JUMPS:
+        clock = serialised(Clock(rospy.Time(rng.choice((0, 1, int(NOW) - 50, int(NOW) + 50, 2**31)))))
+        parts.insert(rng.randrange(1, len(parts) + 1), (topics.index(_CLOCK), clock))
     for _ in range(rng.choice((1, 1, 2, 3))):
         place = rng.randrange(len(parts))
         number, data = parts[place]
@@ -151,7 +160,10 @@ def take(listener: Listener, data: bytes) -> str | None:
         ros.types.update(listener.types)
         settle = listener.make(ros)
         for number, message in unpack(data):
-            for subscriber in ros.listening(topics[number % len(topics)]):
+            topic = topics[number % len(topics)]
+            if topic == _CLOCK:
+                _set_clock(message)
+            for subscriber in ros.listening(topic):
                 try:
                     received = subscriber.received(message)
                 except Exception as error:  # rospy's own code, which logs it and goes on
@@ -163,6 +175,16 @@ def take(listener: Listener, data: bytes) -> str | None:
             settle()
         warnings += ros.said
     return " ".join(warnings[0].split()) if warnings else None
+
+
+def _set_clock(data: bytes) -> None:
+    """Set ROS time by a message on `/clock`, to any that its successors can be told in."""
+    clock = Clock()
+    try:
+        clock.deserialize(data)
+    except genpy.DeserializationError:
+        return
+    rospy.rostime._set_rostime(rospy.Time.from_sec(min(clock.clock.to_sec(), 2.0**32 - 100.0)))
 
 
 # -- good messages -----------------------------------------------------------------------------------------------------
@@ -534,7 +556,11 @@ def _move_base(_ros: Ros) -> Callable[[], object]:
 
     node = MoveBaseNode(read_parameters(_MOVE_BASE), dict(_MOVE_BASE), None)
 
+    began = rospy.get_time()
+
     def settle() -> None:
+        if rospy.get_time() < began:
+            node._clock_set_back(rospy.get_time())
         for _ in range(3):
             node._take_parameters()
             node._tick(rospy.get_time())

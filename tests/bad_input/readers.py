@@ -17,8 +17,10 @@ import cv2
 import numpy as np
 from helpers.campaign_tables import result
 from helpers.mission_bags import adapting_mission
+from metacontrol_bags.adaptation import describe_adaptation
 from metacontrol_bags.bag import BagError, read_record
 from metacontrol_bags.bag_file import BagFile
+from metacontrol_bags.metrics import MetricsError, summarise
 from metacontrol_dashboard.io.bags import read_run
 from metacontrol_dashboard.state.requests import RequestError, read_request
 from metacontrol_experiments.campaign.calibration import CalibrationError
@@ -34,7 +36,14 @@ from metacontrol_experiments.io.tables import read_delays, read_runs
 from metacontrol_experiments.io.yardstick_runs import TraceError, read_trace
 from metacontrol_experiments.lockstep.delays import DelayError
 from metacontrol_experiments.mission.routes import RouteError
-from metacontrol_experiments.pyramid.campaign import parse_pyramids
+from metacontrol_experiments.pyramid.campaign import (
+    PyramidRun,
+    levels,
+    parse_pyramids,
+    read_summary,
+    report,
+    rows,
+)
 from metacontrol_experiments.report.missions import ReportError
 from metacontrol_experiments.report.published import PublishedError
 from metacontrol_sim.ros.send_goal import GoalFileError, read_goal
@@ -421,6 +430,37 @@ def _parquet() -> list[bytes]:
         return [path.read_bytes()]
 
 
+def _result(path: Path) -> object:
+    """Read a result, and write the table of a campaign that has no other one."""
+    found = from_json(read_text(path), str(path))
+    return write_table(path.parent, [found.run], {found.run.name: found}, {"a": "b"})
+
+
+def _table(path: Path) -> object:
+    """Read a table, and write one of what it holds."""
+    found = results_of(path)
+    return write_table(path.parent, [one.run for one in found.values()], found, {"a": "b"})
+
+
+def _summaries() -> list[bytes]:
+    strikes = [{"name": "light:0.04", "recover_s": 0.5}, {"name": "obstacle:left", "recover_s": None}]
+    told = {"success": True, "placed": 6, "duration_s": 70.0, "placed_error_mm": 1.2, "moved_mm": 0.0, "placed_lost": 0}
+    told |= {
+        "stands_still": True,
+        "real_time_factor": 1.0,
+        "outcome": "reached",
+        "reason": "it stands",
+        "commit": "abc",
+    }
+    return [json.dumps(told | {"strikes": strikes}).encode()]
+
+
+def _summary(path: Path) -> object:
+    """Read a summary of D1, and make the tables of a campaign of it."""
+    summary = read_summary(read_text(path), str(path))
+    return [made({PyramidRun(0, 1, "mros", "fd2"): summary}) for made in (report, rows, levels)]
+
+
 def _trace() -> list[bytes]:
     buffer = io.BytesIO()
     np.savez_compressed(buffer, variant="f1", route="r1", seed=1, clutter=0, reached=True, duration_s=3.0,
@@ -443,6 +483,15 @@ def _bags() -> list[bytes]:
         write_journal(path)
         found.append(path.read_bytes())
     return found
+
+
+def _mission(path: Path) -> object:
+    """Read a mission's bag, and tell its figures as JSON."""
+    record = read_record(path)
+    try:
+        return json.dumps([summarise(record), describe_adaptation(record)], allow_nan=False)
+    except MetricsError as error:
+        raise BagError(f"{path}: {error}") from error
 
 
 def _scanned(path: Path) -> object:
@@ -658,11 +707,15 @@ READERS: tuple[Reader, ...] = (
     Reader(
         "a result of a campaign", ("metacontrol_experiments/io/campaign_folder.py",), "json", "result.json",
         lambda: [to_json(result("mros", 2, clutter=7)).encode()], (CampaignError, InputFileError),
-        lambda path: from_json(read_text(path), str(path)), 2.0,
+        _result, 2.0,
+    ),
+    Reader(
+        "a summary of D1", ("metacontrol_experiments/pyramid/campaign.py",), "json", "summary.json",
+        _summaries, (CampaignError, InputFileError), _summary, 2.0,
     ),
     Reader(
         "a table of results", ("metacontrol_experiments/io/campaign_folder.py",), "binary", "bad.parquet",
-        _parquet, (CampaignError,), results_of, 0.2,
+        _parquet, (CampaignError,), _table, 0.2,
     ),
     Reader(
         "a report's table", ("metacontrol_experiments/io/report_files.py",), "binary", "bad.parquet",
@@ -707,7 +760,7 @@ READERS: tuple[Reader, ...] = (
     ),
     Reader(
         "a mission's bag", ("metacontrol_bags/bag_file.py",), "binary", "bad.bag",
-        _bags, (BagError,), read_record, 0.01,
+        _bags, (BagError,), _mission, 0.01,
     ),
     Reader(
         "a reasoner's bag", ("mros1_reasoner/io/reasoner_bag.py",), "binary", "bad.bag",
