@@ -33,20 +33,25 @@ def run(tmp_path, *arguments):
     return command.main(["--output", str(tmp_path), *arguments])
 
 
+def found_in(tmp_path):
+    (folder,) = tmp_path.glob("real-*")
+    return read(folder / "missions.jsonl")
+
+
 def test_missions_are_run_until_enough_faults_have_struck(tmp_path, drives, capsys):
     drives()
     assert run(tmp_path, "--faults", "5", "--seed", "3", "--jobs", "2") == 0
-    found = read(tmp_path / "missions.jsonl")
+    found = found_in(tmp_path)
     assert sorted(one.number for one in found) in ([0, 1, 2], [0, 1, 2, 3])
     assert f"{len(found)} missions of seed 3" in capsys.readouterr().out
-    assert "missions of seed 3" in (tmp_path / "report.md").read_text()
+    assert "missions of seed 3" in next(tmp_path.glob("real-*/report.md")).read_text()
 
 
 def test_same_command_goes_on_where_it_was(tmp_path, drives):
     drives()
     assert run(tmp_path, "--faults", "2") == 0
     assert run(tmp_path, "--faults", "6") == 0
-    assert [one.number for one in read(tmp_path / "missions.jsonl")] == [0, 1, 2]
+    assert [one.number for one in found_in(tmp_path)] == [0, 1, 2]
 
 
 def test_something_broken_is_told(tmp_path, drives, capsys):
@@ -59,7 +64,7 @@ def test_mission_without_a_record_is_told(tmp_path, monkeypatch):
     monkeypatch.setattr(command, "drive_command", lambda seed, number, folder: [sys.executable, "-c", "import nothing"])
     monkeypatch.setattr(command, "FAILURES", 2)
     assert run(tmp_path, "--faults", "1") == 1
-    assert "the soak itself failed" in read(tmp_path / "missions.jsonl")[0].broken[0]
+    assert "the soak itself failed" in found_in(tmp_path)[0].broken[0]
 
 
 def test_interruption_ends_the_mission_under_way(tmp_path, monkeypatch):
@@ -73,7 +78,7 @@ def test_interruption_ends_the_mission_under_way(tmp_path, monkeypatch):
 
     monkeypatch.setattr(command.Soak, "_progress", progress)
     assert run(tmp_path, "--faults", "1") == 130
-    assert (tmp_path / "ended").exists() and read(tmp_path / "missions.jsonl") == []
+    assert (tmp_path / "ended").exists() and found_in(tmp_path) == []
 
 
 @pytest.mark.parametrize(

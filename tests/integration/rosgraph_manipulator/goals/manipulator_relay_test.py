@@ -95,11 +95,10 @@ class RelayTest(PairTest):
         wait_for(lambda: (own, GoalStatus.PREEMPTED) in self.seen, "the goal is taken back")
 
     def test_results_are_passed_on(self):
-        client = actionlib.SimpleActionClient("asked", TestAction)
-        self.assertTrue(client.wait_for_server(rospy.Duration(DEADLINE_S)))
         self.assertIsNotNone(pid_of("/action_relay"))
-        client.send_goal_and_wait(TestGoal(7), rospy.Duration(DEADLINE_S))
-        self.assertEqual((client.get_state(), client.get_result().result), (GoalStatus.SUCCEEDED, 7))
+        handle = self.outer.send_goal(TestGoal(7))
+        wait_for(lambda: handle.get_comm_state() == actionlib.CommState.DONE, "the goal has ended")
+        self.assertEqual((handle.get_terminal_state(), handle.get_result().result), (GoalStatus.SUCCEEDED, 7))
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 """The base's commands: none stays in force while nobody checks it."""
 
+import contextlib
 import threading
 from types import SimpleNamespace
 
@@ -35,22 +36,42 @@ def base(clock, sent):
 @pytest.mark.parametrize(("age", "stops"), [(0.5 * LONGEST_UNCHECKED, False), (1.1 * LONGEST_UNCHECKED, True)])
 def test_command_that_is_not_checked_any_more_is_followed_by_a_stop(base, clock, sent, age, stops):
     base.send(AHEAD)
-    assert base.stop_unchecked(clock.now + age) is stops
+    clock.now += age
+    assert base.stop_unchecked() is stops
     assert sent == [twist_of(AHEAD), twist_of(STOP)][: 1 + stops]
 
 
 def test_stop_is_sent_once(base, clock, sent):
     base.send(AHEAD)
-    assert base.stop_unchecked(clock.now + 1.0)
-    assert not base.stop_unchecked(clock.now + 2.0)
+    clock.now += 1.0
+    assert base.stop_unchecked()
+    clock.now += 1.0
+    assert not base.stop_unchecked()
     base.send(STOP)
-    assert not base.stop_unchecked(clock.now + 3.0)
+    clock.now += 1.0
+    assert not base.stop_unchecked()
 
 
 def test_command_from_before_the_clock_was_set_back_is_not_in_force_any_more(base, clock, sent):
     base.send(AHEAD)
-    assert base.stop_unchecked(clock.now - 50.0)
+    clock.now -= 50.0
+    assert base.stop_unchecked()
     assert sent[-1] == twist_of(STOP)
+
+
+def test_command_that_comes_while_the_watch_waits_stays_in_force(base, clock, sent):
+    base.send(AHEAD)
+
+    class Waited(contextlib.AbstractContextManager):
+        def __enter__(self):
+            clock.now += 0.05
+            base._moving_since = clock.now
+
+        def __exit__(self, *_):
+            pass
+
+    base._lock = Waited()
+    assert not base.stop_unchecked()
 
 
 def test_watch_stops_the_base_while_the_control_loop_is_at_a_long_step(base, clock, sent, monkeypatch):
@@ -69,8 +90,10 @@ def test_watch_stops_the_base_while_the_control_loop_is_at_a_long_step(base, clo
 def test_slow_controller_keeps_its_commands_for_two_periods(base, clock):
     base.reconfigure(1.0)
     base.send(AHEAD)
-    assert not base.stop_unchecked(clock.now + 1.9)
-    assert base.stop_unchecked(clock.now + 2.1)
+    clock.now += 1.9
+    assert not base.stop_unchecked()
+    clock.now += 0.2
+    assert base.stop_unchecked()
 
 
 def test_last_command_of_a_node_that_ends_is_a_stop(base, sent):

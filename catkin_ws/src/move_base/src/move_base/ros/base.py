@@ -56,10 +56,13 @@ class Base:
             if not self._closed:
                 self._publish(velocity)
 
-    def stop_unchecked(self, now: float) -> bool:
-        """Stop the base if its command is too old at a time (ROS s), or from a later one; return whether it was."""
+    def stop_unchecked(self) -> bool:
+        """Stop the base if its command is too old, or from a later time than now; return whether it was."""
         with self._lock:
-            if self._moving_since is None or self._closed or 0.0 <= now - self._moving_since <= self._longest:
+            if self._moving_since is None or self._closed:
+                return False
+            age = rospy.get_time() - self._moving_since  # read here: a command may come while the lock is waited for
+            if 0.0 <= age <= self._longest:
                 return False
             self._publish(STOP)
             return True
@@ -78,7 +81,7 @@ class Base:
     def _watch(self) -> None:
         while not rospy.is_shutdown():
             with contextlib.suppress(rospy.ROSException):  # the node ends just now
-                if self.stop_unchecked(rospy.get_time()):
+                if self.stop_unchecked():
                     rospy.logwarn_throttle(
                         WARN_PERIOD, f"The base is stopped: the control loop has sent nothing for {self._longest:g} s"
                     )

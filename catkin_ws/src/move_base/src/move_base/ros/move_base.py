@@ -146,13 +146,11 @@ class MoveBaseNode:
         """Offer what the first command does not need: services and dynamic_reconfigure."""
         from move_base.ros.reconfigure import offer
 
+        planner = self._parameters.global_planner
         offers: list[tuple[str, Callable[[], object]]] = [
-            (name, partial(rospy.Service, name, kind, answer))
-            for name, kind, answer in (
-                ("~make_plan", GetPlan, self._on_make_plan),
-                (f"~{self._parameters.global_planner}/make_plan", GetPlan, self._on_make_plan),
-                ("~clear_costmaps", Empty, self._on_clear_costmaps),
-            )
+            ("~make_plan", lambda: rospy.Service("~make_plan", GetPlan, self._on_make_plan)),
+            (f"~{planner}/make_plan", lambda: rospy.Service(f"~{planner}/make_plan", GetPlan, self._on_make_plan)),
+            ("~clear_costmaps", lambda: rospy.Service("~clear_costmaps", Empty, self._on_clear_costmaps)),
         ]
         offers += [
             (f"~{one.namespace}", partial(offer, [one], self._present_values, self._reconfigure))
