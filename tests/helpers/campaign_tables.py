@@ -31,6 +31,24 @@ LOG = """3.00 MISSION_START east mission=M route=east
 """Of a mission in lockstep, with all kinds of lines."""
 
 
+def pyramid_summary(success: bool, *times: float | None) -> dict[str, Any]:
+    """Return the summary of a mission with pyramids, the lights of which went out; times in s until it recovered."""
+    return {
+        "success": success,
+        "placed": 6,
+        "duration_s": 70.0,
+        "placed_error_mm": 1.2,
+        "moved_mm": 0.0,
+        "placed_lost": 0,
+        "stands_still": True,
+        "real_time_factor": 1.0,
+        "outcome": "reached",
+        "reason": "the pyramid stands",
+        "commit": "abc",
+        "strikes": [{"name": "light:0.04", "recover_s": time} for time in times],
+    }
+
+
 def result(manager: str = "none", repeat: int = 1, **told: Any) -> Result:
     """Return a mission of a campaign.
 

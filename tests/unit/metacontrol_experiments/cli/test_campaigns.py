@@ -5,6 +5,7 @@ import json
 
 import pytest
 from click.testing import CliRunner
+from helpers.campaign_tables import pyramid_summary
 from helpers.campaign_tables import result as driven
 from metacontrol_experiments.campaign.progress import Attempt, Result, Status
 from metacontrol_experiments.cli import campaign as command
@@ -14,21 +15,8 @@ from metacontrol_experiments.io.campaign_folder import RESULT, RUNS, results_of,
 from metacontrol_experiments.mission.settings import SUMMARY_NAME
 
 D2 = "parts: {main: {routes: [r1], initial_configurations: [f2_v2_r2], managers: {none: 3}}}\n"
+PYRAMIDS = pyramid_summary(True, 0.5)
 D1 = "{mission: manipulation, scenarios: [1], seeds: 3, managers: [mros]}\n"
-PYRAMID = {
-    "success": True,
-    "placed": 6,
-    "duration_s": 70.0,
-    "placed_error_mm": 1.2,
-    "moved_mm": 0.0,
-    "placed_lost": 0,
-    "stands_still": True,
-    "real_time_factor": 1.0,
-    "outcome": "reached",
-    "reason": "the pyramid stands",
-    "commit": "abc",
-    "strikes": [{"name": "light:0.04", "recover_s": 0.5}],
-}
 
 
 def refused(file, folder, *words):
@@ -61,15 +49,15 @@ def test_result_of_d2_that_can_not_be_used_costs_the_others_nothing(tmp_path, sp
 
 @pytest.mark.parametrize(
     "text",
-    ["{}", "[1]", "null", "", "[" * 9999, json.dumps(PYRAMID | {"reason": "\ud800"})]
-    + [json.dumps(PYRAMID | {key: to}) for key, to in (("duration_s", None), ("success", 1), ("strikes", [{}]))],
+    ["{}", "[1]", "null", "", "[" * 9999, json.dumps(PYRAMIDS | {"reason": "\ud800"})]
+    + [json.dumps(PYRAMIDS | {key: to}) for key, to in (("duration_s", None), ("success", 1), ("strikes", [{}]))],
 )
 def test_summary_of_d1_that_can_not_be_used_costs_the_others_nothing(tmp_path, text):
     file, folder = written(tmp_path, "c.yaml", D1), tmp_path / "out"
     for seed in (1, 2, 3):
         home = folder / RUNS / f"scenario1_seed00{seed}_mros"
         home.mkdir(parents=True)
-        (home / SUMMARY_NAME).write_text(text if seed == 2 else json.dumps(PYRAMID))
+        (home / SUMMARY_NAME).write_text(text if seed == 2 else json.dumps(PYRAMIDS))
     refused(file, folder, f"scenario1_seed002_mros/{SUMMARY_NAME}", "delete it, and drive it again")
     with (folder / TABLE).open() as table:
         assert [row["seed"] for row in csv.DictReader(table)] == ["1", "3"]

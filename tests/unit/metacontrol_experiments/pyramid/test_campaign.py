@@ -1,6 +1,7 @@
 """A campaign of D1: its file, and its report."""
 
 import pytest
+from helpers.campaign_tables import pyramid_summary
 from metacontrol_experiments.campaign.matrix import CampaignError
 from metacontrol_experiments.pyramid.campaign import PyramidRun, asks_for_pyramids, levels, parse_pyramids, report, rows
 
@@ -53,26 +54,10 @@ def test_other_files_are_not_about_it():
     assert not asks_for_pyramids(None)
 
 
-def summary(success, *times):
-    strikes = [{"name": "light:0.04", "recover_s": time} for time in times]
-    return {
-        "success": success,
-        "placed": 6,
-        "duration_s": 70.0,
-        "placed_error_mm": 1.2,
-        "moved_mm": 0.0,
-        "placed_lost": 0,
-        "stands_still": True,
-        "real_time_factor": 1.0,
-        "outcome": "reached",
-        "reason": "the pyramid stands",
-        "commit": "abc",
-        "strikes": strikes,
-    }
-
-
 def test_table_has_a_row_for_each_mission_in_the_order_of_scenarios():
-    table = rows({PyramidRun(2, 1, "mros"): summary(True, 2.5), PyramidRun(1, 2, "none"): summary(False)})
+    table = rows(
+        {PyramidRun(2, 1, "mros"): pyramid_summary(True, 2.5), PyramidRun(1, 2, "none"): pyramid_summary(False)}
+    )
     assert [(row["scenario"], row["manager"], row["success"]) for row in table] == [
         (1, "none", False),
         (2, "mros", True),
@@ -83,9 +68,9 @@ def test_table_has_a_row_for_each_mission_in_the_order_of_scenarios():
 def test_report_tells_success_and_how_fast_it_recovers():
     told = report(
         {
-            PyramidRun(1, 1, "mros"): summary(True, 0.5, None),
-            PyramidRun(1, 2, "mros"): summary(True, 0.9),
-            PyramidRun(1, 1, "none"): summary(False),
+            PyramidRun(1, 1, "mros"): pyramid_summary(True, 0.5, None),
+            PyramidRun(1, 2, "mros"): pyramid_summary(True, 0.9),
+            PyramidRun(1, 1, "none"): pyramid_summary(False),
         }
     )
     assert "| `mros` | 2 | 100% (34% to 100%) | 70 s | 1.2 mm | 0 | 1.00 |" in told
@@ -95,7 +80,7 @@ def test_report_tells_success_and_how_fast_it_recovers():
 
 def test_levels_of_designs_come_from_missions_in_which_nothing_went_wrong():
     def built(success, duration):
-        return {**summary(success), "duration_s": duration}
+        return {**pyramid_summary(success), "duration_s": duration}
 
     one, both = "fd1_left,fd1_1,fd2_1", "fd2"
     fast, slow = levels(

@@ -15,8 +15,8 @@ from mros1_reasoner.knowledge.reasoner import ReasonerError
 from mros1_reasoner.loop.readable_state import MapeError
 from mros1_reasoner.replay.recording import RecordingError
 from node_kit.io.background import NoThreadError, in_background
+from node_kit.ros.service_failures import SERVICE_FAILURES
 from rosgraph_manipulator.ros import client
-from rospy.exceptions import TransportException
 from std_srvs.srv import Trigger
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ _MOST_AT_ONCE = 4
 """Requests to one of them that wait for an answer."""
 _TRIGGERS = ("pause", "resume", "lock", "unlock")
 _ERRORS = (
-    *(OSError, rospy.ROSException, rospy.ServiceException, TransportException, client.ClientError),
+    *(*SERVICE_FAILURES, client.ClientError),
     *(MapeError, ReasonerError, RecordingError),
 )
 

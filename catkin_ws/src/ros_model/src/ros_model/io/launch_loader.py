@@ -16,7 +16,7 @@ import roslaunch.xmlloader
 import rospkg
 import yaml
 from node_kit.io.input_files import InputFileError, read_bytes, read_text
-from node_kit.yaml_text import MAX_VALUES, YamlError, explained
+from node_kit.yaml_text import MAX_DIGITS, MAX_VALUES, YamlError, explained
 from rosgraph.names import ns_join
 
 from ros_model.errors import ModelError
@@ -409,8 +409,8 @@ class _YamlLoader(yaml.SafeLoader):
         """Return what a node says."""
         if node.tag in _ANGLES and node.tag in self.yaml_constructors:  # rosparam adds them when it is imported
             return self._angle(node)
-        if node.tag in _NUMBERS and len(node.value) > _MAX_NUMBER:
-            problem = f"a number has {len(node.value)} characters (at most {_MAX_NUMBER})"
+        if node.tag in _NUMBERS and len(node.value) > MAX_DIGITS:
+            problem = f"a number has {len(node.value)} characters (at most {MAX_DIGITS})"
             raise yaml.constructor.ConstructorError(None, None, problem, node.start_mark)
         return super().construct_object(node, deep=deep)
 
@@ -426,7 +426,6 @@ class _YamlLoader(yaml.SafeLoader):
 
 
 _NUMBERS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
-_MAX_NUMBER = 1_100  # characters; the largest double has 1,024 digits in base 2
 _ANGLES: dict[str, tuple[str, Callable[[str], float]]] = {
     "!radians": ("rad(", lambda text: float(evaluate(text, {"pi": math.pi}.__getitem__))),
     "!degrees": ("deg(", lambda text: float(text) * math.pi / 180.0),

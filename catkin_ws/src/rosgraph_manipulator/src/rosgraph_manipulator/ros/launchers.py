@@ -21,6 +21,7 @@ from metacontrol_msgs.srv import (
     StandByRequest,
 )
 from node_kit.io.background import NoThreadError, in_background, start_thread
+from node_kit.ros.service_failures import SERVICE_FAILURES
 from rosgraph_launcher.description import NodeDescription
 from rosgraph_launcher.hosts import no_launcher
 from rosgraph_launcher.io.master import NodeApi
@@ -33,7 +34,6 @@ from rosgraph_manipulator.change.deployment import DeploymentError
 from rosgraph_manipulator.hosts.merging import stale
 from rosgraph_manipulator.hosts.splitting import Part, split
 from rosgraph_manipulator.ros.launcher_reports import ASKING, REPEAT_PERIOD, WATCH_PERIOD, LauncherReports
-from rosgraph_manipulator.ros.service_failures import SERVICE_FAILURES
 
 _NOT_REACHED = (TransportInitError, rosgraph.MasterError, NoThreadError)
 """How a request fails that was not sent: what rospy has caught when it raises a ServiceException (no registration, no

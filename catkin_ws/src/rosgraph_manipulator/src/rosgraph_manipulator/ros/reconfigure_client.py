@@ -20,13 +20,13 @@ from dynamic_reconfigure.msg import (
 from dynamic_reconfigure.srv import Reconfigure
 from node_kit.io.background import in_background
 from node_kit.io.xml_rpc import CallError
+from node_kit.ros.service_failures import SERVICE_FAILURES
 from rosgraph_launcher.io.master import NodeApi
 
 from rosgraph_manipulator.change.deployment import DeploymentError
 from rosgraph_manipulator.change.tactics import Adjustable
 from rosgraph_manipulator.configuration.difference import same_value
 from rosgraph_manipulator.io.master import services_of
-from rosgraph_manipulator.ros.service_failures import SERVICE_FAILURES
 
 DESCRIPTION_TIMEOUT = 1.0  # s, wall, for all servers of a node to describe themselves
 SET_TIMEOUT = 1.0  # s, wall, for a server to take values

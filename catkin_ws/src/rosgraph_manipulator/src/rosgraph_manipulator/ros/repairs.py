@@ -19,6 +19,7 @@ import rospy
 from metacontrol_msgs.msg import RepairAction, RepairResult
 from node_kit.io.background import NoThreadError, in_background, start_thread
 from node_kit.io.inbox import Inbox
+from node_kit.ros.service_failures import SERVICE_FAILURES
 from rosservice import ROSServiceException, get_service_type
 from std_srvs.srv import Empty, Trigger
 
@@ -35,7 +36,6 @@ from rosgraph_manipulator.change.repairs import (
 )
 from rosgraph_manipulator.configuration.configurations import Configuration, ManipulatorOptions, Repair
 from rosgraph_manipulator.ros.action_server import ActionServer
-from rosgraph_manipulator.ros.service_failures import SERVICE_FAILURES
 
 ACTION = "rosgraph_manipulator/repair"
 

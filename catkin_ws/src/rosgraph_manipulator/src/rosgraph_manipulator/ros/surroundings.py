@@ -13,6 +13,7 @@ from typing import Any
 import rospy
 from geometry_msgs.msg import Twist
 from node_kit.io.background import NoThreadError
+from node_kit.ros.service_failures import SERVICE_FAILURES
 from rosgraph_launcher.description import NodeDescription
 from rosgraph_launcher.io.command_lines import CommandLineError, command_line
 from rosgraph_launcher.io.master import NodeApi, advertised
@@ -22,7 +23,6 @@ from rosgraph_manipulator.configuration.configurations import Configuration
 from rosgraph_manipulator.io import foreign_nodes
 from rosgraph_manipulator.io.launch_files import LaunchFile, read_configuration
 from rosgraph_manipulator.io.master import get_parameters, publishers, set_parameters
-from rosgraph_manipulator.ros.service_failures import SERVICE_FAILURES
 
 COMMAND_TIMEOUT = 5.0  # s, wall, for a `rosparam` call of a launch file
 ASK_THREADS = 8  # nodes are asked side by side whether they hang

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 import rospy
 from metacontrol_msgs.srv import ReadUsage
 from node_kit.io.background import in_background
+from node_kit.ros.service_failures import SERVICE_FAILURES
 from rosgraph_launcher.io.ownership import is_this_host
 from rosgraph_launcher.io.this_host import resolved as addresses_of
 from rosgraph_launcher.io.usage import read_sample
 from rosgraph_launcher.ros.node_messages import samples_from
-from rospy.exceptions import TransportException
 
 from rosgraph_monitor.graph.names import resolved
 from rosgraph_monitor.health.usage import THIS_HOST, UsageMeter, host_of, launchers_in, tellers
@@ -144,6 +144,6 @@ def _read(launcher: str, nodes: Mapping[str, int], alone: Collection[str]) -> di
     without_children = [pid for node, pid in nodes.items() if node in alone]
     try:
         answer = rospy.ServiceProxy(f"{launcher}/usage", ReadUsage)(list(nodes.values()), without_children)
-    except (rospy.ServiceException, rospy.ROSException, TransportException, OSError):
+    except SERVICE_FAILURES:
         return {}
     return samples_from(answer.processes)
