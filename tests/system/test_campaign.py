@@ -24,6 +24,11 @@ parts:
     initial_configurations: [f2_v2_r2]
     managers: {none: 2, respawn: 2}
 """
+SHORT = """
+r1: {start: [-8, -8, 0.78], goal: [-5, -5.7, 0]}
+r2: {start: [-3, -4.2, 3.14], goal: [-6, -6.5, 3.14]}
+"""
+"""Routes of the campaign that is driven on ROS."""
 
 
 @pytest.fixture
@@ -139,7 +144,8 @@ def test_campaign_of_the_tests_leaves_a_table_from_which_a_report_is_made(ended,
 
 
 def test_runs_on_ros_side_by_side_have_masters_of_their_own(ended, tmp_path):
-    text = f"engine: ros\nlogs: true{CAMPAIGN}".replace("{none: 2, respawn: 2}", "{none: 1}")
+    (tmp_path / "routes.yaml").write_text(SHORT)
+    text = f"engine: ros\nlogs: true\nroutes_file: routes.yaml{CAMPAIGN}".replace("{none: 2, respawn: 2}", "{none: 1}")
     command = campaign(ended, tmp_path, "--jobs", "2", text=text)
     assert command.wait(150) == 0
     table = parquet.read_table(tmp_path / "out" / "results.parquet").to_pylist()
