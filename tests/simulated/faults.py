@@ -65,7 +65,7 @@ TOPICS = ("active", "diagnostics", "functions")
 _OFTEN = {Kind.KILL_PART: 5, Kind.KILL_NODE: 5, Kind.REQUEST: 3, Kind.KILL_DRIVER: 2, Kind.FREEZE_NODE: 2}
 _LOW, _HIGH = 0.2, 20.0
 _VALUES: dict[Kind, tuple[float, float]] = {
-    Kind.FREEZE_PART: (0.1, 10.0),
+    Kind.FREEZE_PART: (0.1, 25.0),
     Kind.DIES_LATER: (0.05, 8.0),
     Kind.SLOW: (0.5, 5.0),
     Kind.MASTER_SILENT: (0.1, 5.0),

@@ -34,6 +34,7 @@ TACTICS = {"nothing": nothing, "parameters": parameters, "restart": restart, "re
 LAUNCHER = "rosgraph_launcher"
 LOOK_PERIOD = 0.5  # s
 FIND = 10.0  # s, for a launcher to be found
+JUST_NOW = 1.0  # s, in which the launcher may have stopped since it was found
 EPOCH = 1.7e9  # s, of the wall clock at the start
 ROSLAUNCH = "roslaunch"  # starts each manipulator
 
@@ -73,6 +74,7 @@ class ManipulatorPart:
         self._inbox = Inbox(process)
         self.busy = True
         self.serves = False
+        self.found = float("-inf")  # when it was seen last that the launcher answers, s
         self.told: dict[str, Active] = {}
         self.heard: tuple[LauncherReport, ...] | None = None  # the launcher's last reports
         topics["active"].advertise(process)
@@ -151,6 +153,11 @@ class ManipulatorPart:
     def wall(self) -> float:
         """Return the time of the wall clock, s since the epoch."""
         return EPOCH + self.host.kernel.now + self.host.wall_offset
+
+    def launcher_answers(self) -> bool:
+        """Tell whether the launcher is there and does not hang."""
+        launcher = self._launcher()
+        return launcher is not None and not launcher.process.frozen
 
     @property
     def launcher(self) -> LauncherPart | None:
@@ -278,9 +285,12 @@ class _Around:
 
     def shut_down(self, node: str, reason: str) -> bool:
         process = self._host.answering(node)
-        if process is not None:
+        if process is not None and self.now() >= self._host.silent_until:  # else nobody knows where it is
+            if not self._part.launcher_answers() and self.now() - self._part.found > JUST_NOW:
+                raise AssertionError(f"node {node} is ended, and nobody can start another one in its place")
             self._host.ask_to_end(process)
-        return process is not None
+            return True
+        return False
 
     def is_answering(self, node: str) -> bool:
         return self._host.answering(node) is not None
@@ -371,6 +381,14 @@ class _Launchers:
         self._parts[function] = frozenset()
         self.on_reports()
 
+    def require(self, function: str, nodes: Iterable[NodeDescription]) -> None:
+        self._find(FIND, self._part.launcher_answers)
+        self._part.found = self._part.host.kernel.now
+
+    def _find(self, timeout: float, is_found: Callable[[], bool]) -> None:
+        if not self._part.process.wait_for(is_found, timeout):
+            raise DeploymentError(f"/{LAUNCHER} has failed (timeout exceeded): check that it runs")
+
     def change(
         self,
         function: str,
@@ -410,8 +428,7 @@ class _Launchers:
         process, kernel = self._part.process, self._part.host.kernel
         deadline = kernel.now + FIND
         while True:
-            if not process.wait_for(lambda: self._present() is not None, max(deadline - kernel.now, 0.01)):
-                raise DeploymentError(f"/{LAUNCHER} has failed (timeout exceeded): check that it runs")
+            self._find(max(deadline - kernel.now, 0.01), lambda: self._present() is not None)
             found()
             launcher = self._present()
             process.pause(kernel.uniform(0.001, 0.01))

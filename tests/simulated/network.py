@@ -89,7 +89,11 @@ class Topic:
 
     def _connect(self, publisher: Process, subscriber: _Subscriber) -> None:
         def connected() -> None:
-            if publisher.alive and subscriber.process.alive:
+            if not (publisher.alive and subscriber.process.alive):
+                return
+            if publisher.frozen or subscriber.process.frozen:  # who hangs takes no part in making it
+                self._kernel.after(0.05, connected)
+            else:
                 connection = subscriber.connections[id(publisher)] = _Connection(publisher, next(self._connections))
                 last = self._publishers.get(publisher)
                 if self._latched and last is not None:

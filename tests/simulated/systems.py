@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import tempfile
+from collections import Counter
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -15,7 +17,7 @@ from mros1_reasoner.knowledge.model import Direction, Objective
 from ros_model.io.project import load_project
 from ros_model.language.metamodel import Component, RosSystem
 from rosgraph_launcher.description import NodeDescription, SystemDescription
-from rosgraph_manipulator.configuration.configurations import Configuration, ManipulatorOptions
+from rosgraph_manipulator.configuration.configurations import Configuration, FunctionOptions, ManipulatorOptions
 
 TESTS = Path(__file__).resolve().parents[1]
 
@@ -97,8 +99,19 @@ def load(name: str) -> System:
         for component, entry in project.settings.get("components", {}).items()
         if entry.get("node")
     }
-    options = ManipulatorOptions(configurations)
+    options = ManipulatorOptions(configurations, _function_options(configurations.values(), described))
     return System(name, namespace, project.base, variants, options, described, knowledge, components)
+
+
+def _function_options(
+    configurations: Collection[Configuration], described: Mapping[str, SystemDescription]
+) -> dict[str, FunctionOptions]:
+    """Return the options of each function: nodes of its variants alone are ended where somebody else has them."""
+    nodes: dict[str, set[str]] = {}
+    for configuration in configurations:
+        nodes.setdefault(configuration.function, set()).update(described[configuration.name].nodes)
+    shared = {node for node, count in Counter(node for own in nodes.values() for node in own).items() if count > 1}
+    return {name: FunctionOptions(kill_nodes=tuple(sorted(own - shared))) for name, own in nodes.items()}
 
 
 def _designs(entry: Any) -> list[str]:

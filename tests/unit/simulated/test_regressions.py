@@ -150,3 +150,19 @@ def test_lock_of_an_objective_that_is_still_to_come_outlasts_one_of_all_and_the_
         Fault(7.081, Kind.KILL_PART, "reasoner"),
     )
     holds(History(60014042, "station", faults, Policy.WAIT))
+
+
+def test_strange_node_is_not_ended_while_the_launcher_is_gone():
+    faults = (
+        Fault(13.232, Kind.FOREIGN, "/move_base", 2.789),
+        Fault(14.049, Kind.KILL_PART, "launcher"),
+    )
+    holds(History(160001721, "d2", faults, Policy.WAIT))
+
+
+def test_manipulator_that_begins_while_the_launcher_hangs_ends_no_node():
+    faults = (
+        Fault(20.0, Kind.FREEZE_PART, "launcher", 25.0),
+        Fault(22.0, Kind.KILL_PART, "manipulator"),
+    )
+    holds(History(1, "d2", faults, Policy.WAIT))

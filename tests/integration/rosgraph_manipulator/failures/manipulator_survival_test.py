@@ -2,6 +2,7 @@
 """Nodes, launcher, manipulator and master die in the middle of everything; the mission comes back, nothing is left."""
 
 import base64
+import contextlib
 import io
 import os
 import signal
@@ -39,6 +40,9 @@ class SurvivalTest(PairTest):
         pid = pid_of("/wait_server")
         os.kill(pid, signal.SIGKILL)
         return pid
+
+    def kill_launcher(self):
+        self.launcher.end(signal.SIGKILL)
 
     def restart_launcher(self):
         self.launcher.wait()
@@ -216,8 +220,7 @@ class SurvivalTest(PairTest):
 
     def test_launcher_that_dies_just_when_it_is_asked_is_waited_for(self):
         """The kernel closes a dying launcher's sockets one by one: it may be found, and then refuse the request."""
-        self.launcher.end(signal.SIGKILL)
-        found = self.pretend_to_be_launcher(accept_one)
+        found = self.pretend_to_be_launcher(lambda server: accept_one(server, self.kill_launcher))
         self.client.send_goal(MvpReconfigurationGoal("fast"))
         found.join(DEADLINE_S)
         self.assertFalse(found.is_alive(), self.manipulator.said())
@@ -226,8 +229,7 @@ class SurvivalTest(PairTest):
         self.assertEqual(self.client.get_result().result, 1, self.text)
 
     def test_launcher_that_dies_before_it_answers_leaves_the_request_for_its_successor(self):
-        self.launcher.end(signal.SIGKILL)
-        asked = self.pretend_to_be_launcher(break_off_one)
+        asked = self.pretend_to_be_launcher(lambda server: break_off_one(server, self.kill_launcher))
         self.client.send_goal(MvpReconfigurationGoal("fast"))
         asked.join(DEADLINE_S)
         self.assertFalse(asked.is_alive(), self.manipulator.said())
@@ -247,19 +249,56 @@ class SurvivalTest(PairTest):
         self.assertEqual(self.request("fast"), 0)
         self.assertRegex(self.text, "rosgraph_launcher has failed .*: check that it runs; slow was restored")
 
-    def test_launcher_that_hangs_is_given_up_and_does_not_make_the_change_when_it_goes_on(self):
+    def test_launcher_that_hangs_in_a_change_is_given_up(self):
         self.set_launcher_timeout(5.0)
         self.addCleanup(self.set_launcher_timeout, 40.0)
-        told = len(self.launcher_states)
-        os.kill(self.launcher.pid, signal.SIGSTOP)  # the kernel goes on to take connections for it
-        try:
-            self.assertEqual(self.request("stubborn"), -2)
+        self.assertEqual(self.request("stubborn"), 1, self.text)  # the launcher waits for its end
+        self.client.send_goal(MvpReconfigurationGoal("slow"))
+        wait_for(lambda: self.launcher_state.state == "CHANGING", "the change has begun")
+        with self.launcher_stopped():
+            self.assertTrue(self.client.wait_for_result(rospy.Duration(DEADLINE_S)))
+            self.assertEqual(self.client.get_result().result, -2, self.text)
             self.assertIn("/rosgraph_launcher takes requests and does not answer", self.text)
-        finally:
-            os.kill(self.launcher.pid, signal.SIGCONT)
+        self.assertEqual(self.request("fast"), 1, self.text)
+
+    def test_launcher_that_hangs_leaves_what_runs_untouched(self):
+        self.set_launcher_timeout(5.0)
+        self.addCleanup(self.set_launcher_timeout, 40.0)
+        told, before = len(self.launcher_states), pid_of("/wait_server")
+        with self.launcher_stopped():
+            self.assertEqual(self.request("stubborn"), 0)
+            self.assertIn("/rosgraph_launcher does not answer, so nothing is changed", self.text)
+            self.assertTrue(self.is_in("slow", "STABLE"), self.states[-1])
+        self.assertEqual(pid_of("/wait_server"), before)
         self.assertEqual(self.request("fast"), 1, self.text)
         seen = {state.configuration for state in self.launcher_states[told:]}
-        self.assertEqual(seen - {""}, {"slow", "fast"})  # told as FAILED, so what had run may be stopped first
+        self.assertEqual(seen - {""}, {"slow", "fast"})
+
+    def test_manipulator_that_begins_while_the_launcher_hangs_ends_no_node(self):
+        """It does not know whose they are, and to start others is not possible."""
+        rospy.set_param("rosgraph_manipulator/kill_nodes", ["wait_server"])
+        self.addCleanup(rospy.delete_param, "rosgraph_manipulator/kill_nodes")
+        self.set_launcher_timeout(5.0)
+        self.addCleanup(self.set_launcher_timeout, 40.0)
+        before = pid_of("/wait_server")
+        with self.launcher_stopped():
+            self.manipulator.end(signal.SIGKILL)
+            self.restart_manipulator()
+            self.wait_until_it_serves()
+            self.assertEqual(self.request("fast"), -2)
+            self.assertIn("/rosgraph_launcher does not answer, so nothing is changed", self.text)
+            self.assertEqual(pid_of("/wait_server"), before)
+            self.assertTrue(is_alive(before))
+        self.assertEqual(self.request("fast"), 1, self.text)
+
+    @contextlib.contextmanager
+    def launcher_stopped(self):
+        """Have the launcher hang within a block; the kernel goes on to take connections for it."""
+        os.kill(self.launcher.pid, signal.SIGSTOP)
+        try:
+            yield
+        finally:
+            os.kill(self.launcher.pid, signal.SIGCONT)
 
     def set_launcher_timeout(self, timeout):
         """Have another manipulator take over, which has another time to look for a launcher, s."""
@@ -319,14 +358,15 @@ class SurvivalTest(PairTest):
             master.wait(DEADLINE_S)
 
 
-def accept_one(server):
+def accept_one(server, then=lambda: None):
     """Accept a connection, then refuse all others."""
     connection, _ = server.accept()
     server.close()
+    then()
     connection.close()
 
 
-def break_off_one(server, then=socket.socket.close):
+def break_off_one(server, meanwhile=lambda: None, then=socket.socket.close):
     """Accept connections until one has a request, read that, and break it off."""
     asked = False
     while not asked:
@@ -339,6 +379,7 @@ def break_off_one(server, then=socket.socket.close):
                 answer = {"md5sum": ChangeNodes._md5sum, "type": ChangeNodes._type, "callerid": "/dying_launcher"}
                 rosgraph.network.write_ros_handshake_header(connection, answer)
                 rest.getvalue() or connection.recv(4096)
+                meanwhile()
     then(server)
 
 

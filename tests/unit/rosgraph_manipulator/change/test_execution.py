@@ -67,6 +67,7 @@ def execution(around):
     launchers = SimpleNamespace(
         reports=dict,
         is_here=lambda node: True,
+        require=lambda function, nodes: None,
         change=lambda *_, **__: SimpleNamespace(number=1, phases={}),
     )
     return execution_of(
@@ -148,6 +149,8 @@ def test_what_could_not_be_handed_over_after_a_restoration_is_later(around, fail
 class Launchers:
     """A launcher that makes each change at once."""
 
+    answers = True
+
     def __init__(self):
         self.reported, self.number = {}, 0
 
@@ -162,6 +165,10 @@ class Launchers:
 
     def adopt(self, function, nodes):
         pass
+
+    def require(self, function, nodes):
+        if not self.answers:
+            raise DeploymentError("the launcher does not answer")
 
     def change(self, function, configuration, nodes, stop, start, found):
         self.number += 1
@@ -267,3 +274,17 @@ def test_parameters_of_a_died_node_are_put_back_once_the_master_answers():
     around.server["/fast/speed"] = 3  # set for the node that runs
     execution.catch_up()
     assert around.server["/fast/speed"] == 3
+
+
+def test_driver_is_not_ended_where_none_can_be_started():
+    around, launchers = LaunchFiles({}), Launchers()
+    execution = execution_of(around, launchers, all_up, LOOK)
+    ended = []
+    around.end_node, around.why_not_started = ended.append, lambda node: ""
+    launchers.answers = False
+    with pytest.raises(DeploymentError, match="does not answer"):
+        execution.start_driver(LOOK)
+    assert (ended, launchers.number) == ([], 0)
+    launchers.answers = True
+    execution.start_driver(LOOK)
+    assert (ended, launchers.number) == (["/look"], 1)

@@ -23,6 +23,7 @@ class Executor:
     launcher_phases: dict = {}
     losses = 0
     launcher_gone = taken_back = False
+    launcher_answers = True
     halts = 0
     now = 0.0
     launched = LauncherReport("f", "a", state=STABLE)
@@ -36,6 +37,10 @@ class Executor:
         if self._compare:
             raise self._compare
         return Comparison(SystemDescription({}, {}), SystemDescription({}, {}), frozenset(), {})
+
+    def require_launchers(self, configuration):
+        if not self.launcher_answers:
+            raise DeploymentError("the launcher does not answer")
 
     def change_processes(self, stop, start):
         self.done.append("touched")
@@ -159,6 +164,17 @@ def test_change_that_can_not_begin_leaves_what_runs():
     manipulator, _ = manipulation(executor, running="a")
     assert manipulator.carry_out(Order("f", "b")).running == A
     assert executor.done == []
+
+
+@pytest.mark.parametrize(("running", "result"), [("a", Result.FAILED), ("", Result.GENERAL_ERROR)])
+def test_change_without_a_launcher_touches_nothing(running, result):
+    executor = Executor()
+    executor.launcher_answers = False
+    manipulator, _ = manipulation(executor, running)
+    assert manipulator.carry_out(Order("f", "b")).result is result
+    assert not {"touched", "a restored", "f released"}.intersection(executor.done)
+    executor.launcher_answers = True
+    assert manipulator.carry_out(Order("f", "b")).result is Result.OK
 
 
 def test_change_that_can_not_begin_stops_what_is_left_where_nothing_whole_runs():

@@ -243,6 +243,26 @@ def test_launcher_that_lives_may_take_its_time_for_a_change(followed, around, mo
     assert ask(followed, NODE).number == 4
 
 
+def test_change_is_possible_only_while_all_launchers_answer_that_have_a_part_of_it(followed, around):
+    tell(followed, MAIN)
+    tell(followed, SECOND)
+    followed.require("f", [NODE])
+    around.living.discard(SECOND)  # it has a node of the function, though none of these
+    with pytest.raises(DeploymentError, match=f"^{SECOND} does not answer, so nothing is changed"):
+        followed.require("f", [NODE])
+    followed.require("another", [NODE])
+    around.living = {SECOND}
+    with pytest.raises(DeploymentError, match=f"^{MAIN} does not answer"):
+        followed.require("another", [NODE])
+    assert around.requests == []
+
+
+def test_launcher_that_comes_is_waited_for(followed, around, monkeypatch):
+    answers = iter([False, False, True])
+    monkeypatch.setattr(around, "is_answering", lambda name: next(answers))
+    followed.require("f", [NODE])
+
+
 def test_end_of_the_main_launcher_concerns_the_functions_of_which_it_has_a_part(followed, around):
     tell(followed, MAIN)
     followed.adopt("f", [NODE])

@@ -147,6 +147,14 @@ class Execution:
         """How often a host was lost."""
         return self._launchers.losses
 
+    def require_launchers(self, configuration: Configuration) -> None:
+        """Wait until the launchers answer that the change to a configuration asks.
+
+        Raises:
+            DeploymentError: one does not, so nothing can be changed.
+        """
+        self._launchers.require(configuration.function, self.system.launch_file(configuration).system.nodes.values())
+
     # -- steps ----------------------------------------------------------------------------------------------------
 
     def begin(self, wanted: Configuration, plan: Plan) -> None:
@@ -172,7 +180,7 @@ class Execution:
         self._progress.start(start)
         self._names.see_takers(set(start) - self._progress.at_work)
         if leaving:
-            self._end_foreign_nodes(wanted.function)
+            self._end_foreign_nodes(wanted)
             self._see_who_leaves(wanted.function, leaving)
         self._store_parameters(wanted.function, launch)
         given_up = self._progress.given_up(wanted.function, launch.system.nodes)
@@ -376,6 +384,7 @@ class Execution:
                 "which restarts nodes that hang"
             )
         names = self._make_names(system.nodes.get, lambda node: node not in self._progress.launched_for(function))
+        self.require_launchers(driver)
         for node in set(start) - self._progress.at_work:
             self._around.end_node(node)
         names.see_takers(set(start) - self._progress.at_work)
@@ -467,12 +476,14 @@ class Execution:
         launch = self._recovers and self.system.deployed_file(wanted)
         return (launch or self.system.launch_file(wanted)).system.nodes.get(node)
 
-    def _end_foreign_nodes(self, function: str) -> None:
+    def _end_foreign_nodes(self, wanted: Configuration) -> None:
         """End nodes of the same function that somebody else started."""
-        for node in self._options.of(function).kill_nodes:
-            name = self._around.resolve(node)
-            ours = name in self._progress.at_work
-            if not ours and self._around.shut_down(name, "replaced by another configuration"):
+        names = {self._around.resolve(node) for node in self._options.of(wanted.function).kill_nodes}
+        foreign = sorted(names - self._progress.at_work)
+        if foreign:
+            self.require_launchers(wanted)
+        for name in foreign:
+            if self._around.shut_down(name, "replaced by another configuration"):
                 gone = self._wait_until(lambda: not self._around.is_answering(name), self._ready_timeout)  # noqa: B023
                 if not gone:
                     raise DeploymentError(f"node {name} does not end")

@@ -217,6 +217,7 @@ class Manipulation:
         try:
             with watch.phase("plan"):
                 plans = self._plans(found := self._executor.system.compare(wanted, restart))
+                self._executor.require_launchers(wanted)
         except self._failures as error:
             outcome = deployments.refused(wanted, " ".join(str(error).split()))
             if outcome.running is None and (deployments.torn or self._executor.has_nodes(wanted.function)):

@@ -137,6 +137,9 @@ class Launchers(Protocol):
     def reports(self) -> dict[str, LauncherReport]:
         """Return what all launchers tell together, by function."""
 
+    def require(self, function: str, nodes: Iterable[NodeDescription]) -> None:
+        """Wait until the launchers answer that a change to nodes asks; raise DeploymentError where one does not."""
+
     def change(
         self,
         function: str,

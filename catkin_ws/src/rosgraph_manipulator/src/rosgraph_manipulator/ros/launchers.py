@@ -69,6 +69,36 @@ class Launchers(LauncherReports):
 
     # -- changes --------------------------------------------------------------------------------------------------
 
+    def require(self, function: str, nodes: Iterable[NodeDescription]) -> None:
+        """Wait until the launchers answer that a change of a function asks.
+
+        What a change does before it asks them, such as ending nodes of others, can't be undone without them.
+
+        Args:
+            function: its name.
+            nodes: those that it is to have.
+
+        Raises:
+            DeploymentError: one is not there, or hangs.
+        """
+        places = {self._place(node) for node in nodes}
+        with self._lock:
+            having = {name for name, report in self._of(function).items() if report.configuration or report.nodes}
+            names = places | {name for name in having if not self._known[name].lost}
+        deadline = time.monotonic() + self._timeout
+        asked = {name: in_background(partial(self._answers, name, deadline), ASKING) for name in sorted(names)}
+        for name, answer in asked.items():
+            if not self._result(name, answer):
+                raise DeploymentError(f"{name} does not answer, so nothing is changed: kill it, and start it again")
+
+    def _answers(self, name: str, deadline: float) -> bool:
+        """Wait until the API of a launcher answers; its services are found although it hangs."""
+        while not NodeApi.is_answering(name):
+            if time.monotonic() > deadline or rospy.is_shutdown():
+                return False
+            time.sleep(REPEAT_PERIOD)
+        return True
+
     def change(
         self,
         function: str,
