@@ -35,6 +35,8 @@ from rosgraph_manipulator.hosts.merging import stale
 from rosgraph_manipulator.hosts.splitting import Part, split
 from rosgraph_manipulator.ros.launcher_reports import ASKING, REPEAT_PERIOD, WATCH_PERIOD, LauncherReports
 
+ASK_PERIOD = 0.05  # s, wall, between two questions whether a launcher is there
+
 _NOT_REACHED = (TransportInitError, rosgraph.MasterError, NoThreadError)
 """How a request fails that was not sent: what rospy has caught when it raises a ServiceException (no registration, no
 connection), and no thread that asks."""
@@ -96,7 +98,7 @@ class Launchers(LauncherReports):
         while not NodeApi.is_answering(name):
             if time.monotonic() > deadline or rospy.is_shutdown():
                 return False
-            time.sleep(REPEAT_PERIOD)
+            time.sleep(ASK_PERIOD)
         return True
 
     def change(
