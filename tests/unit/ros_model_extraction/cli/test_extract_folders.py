@@ -60,11 +60,15 @@ def test_package_that_its_reader_falls_over_does_not_hinder_the_others(run, fold
     assert [path.name for path in (folders / "out").iterdir()] == ["ferry.ros"]
 
 
+DEEP = 1020
+"""More folders than Python has frames (`sys.getrecursionlimit()`)."""
+
+
 @pytest.fixture
 def far_below(folders):
-    """A package with 1,500 folders above it."""
+    """A package with many folders above it."""
     here = os.open(folders, os.O_RDONLY)
-    for _ in range(1500):
+    for _ in range(DEEP):
         os.mkdir("a", dir_fd=here)
         below = os.open("a", os.O_RDONLY, dir_fd=here)
         os.close(here)
@@ -78,7 +82,7 @@ def far_below(folders):
 
 def test_package_far_below_is_found(far_below):
     found, remarks = find_packages(far_below)
-    assert [len(folder.relative_to(far_below).parts) for folder in found] == [1500, 1, 1] and remarks == ()
+    assert [len(folder.relative_to(far_below).parts) for folder in found] == [DEEP, 1, 1] and remarks == ()
 
 
 def test_headers_of_odd_names_and_circles_of_links_are_taken(run, folders, monkeypatch):
