@@ -62,7 +62,9 @@ class CellTest(unittest.TestCase):
         cls.gripper = actionlib.ActionClient("left_arm/gripper_command", GripperCommandAction)
         for client in (cls.arm, cls.gripper):
             assert wait_for_server(client, DEADLINE)
-        cls.state.next()
+        # An arm that has not heard yet where it is refuses goals, and reports nothing.
+        reports = {f"{name}_arm: safety" for name in ("left", "right")}
+        wait_for(lambda: reports <= cls.levels.keys(), lambda: f"both arms report: {sorted(cls.levels)}", DEADLINE)
 
     @classmethod
     def take_statuses(cls, message):
