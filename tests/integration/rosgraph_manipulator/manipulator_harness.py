@@ -65,7 +65,7 @@ CONFIGURATIONS = {
     "hangs": configuration(args="--hang"),
     "stubborn": configuration(args="--stubborn"),
     "dies": configuration(args="--die-after 0.3"),
-    "dies_at_once": configuration(args="--die-after 0.01"),
+    "dies_at_once": configuration(args="--die-after 0"),
     "malformed": {"function": "f_wait", "launch": str(HERE / "malformed.launch")},
     "undefined": {"function": "f_wait", "launch": str(HERE / "undefined.launch")},
     "no_package": {"function": "f_wait", "command": "roslaunch no_such_package x.launch"},

@@ -28,7 +28,7 @@ class FunctionsTest(PairTest):
         "look_fast": configuration("f_look", "look", "rate:=4.0"),
         "pick_softly": configuration("f_pick", "pick", "force:=1"),
         "pick_hard": configuration("f_pick", "pick", "force:=9"),
-        "pick_dying": configuration("f_pick", "pick", "force:=1", "args:=--die-after 0.01"),
+        "pick_dying": configuration("f_pick", "pick", "force:=1", "args:=--die-after 0"),
         "pick_otherwise": configuration("f_pick", "pick", "force:=1", "raw:=other"),
         "sort_slowly": configuration("f_sort", "sort", "rate:=1.0"),
         "sort_fast": configuration("f_sort", "sort", "rate:=5.0"),

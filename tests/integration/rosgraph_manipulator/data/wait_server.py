@@ -10,7 +10,6 @@ import os
 import signal
 import socket
 import sys
-import threading
 import time
 from pathlib import Path
 
@@ -65,8 +64,9 @@ if options.passes_on:
     while not (heard_by("/rosgraph_manipulator") or heard_by("/action_relay")):  # who keeps the goal
         rospy.sleep(0.01)
     rospy.Subscriber("simple_goal", Empty, lambda _: client.send_goal(TestGoal(0)))
-if options.die_after:
-    threading.Timer(options.die_after, os._exit, [3]).start()
+if options.die_after is not None:
+    time.sleep(options.die_after)
+    os._exit(3)
 while options.stubborn:
     time.sleep(1.0)
 rospy.spin()

@@ -29,7 +29,7 @@ class HostsTest(PairTest):
     configurations = {
         "both": configuration("hosts", f"address:={ADDRESS}"),
         "missing": configuration("hosts", f"address:={ADDRESS}", "far:=no_such_node.py"),
-        "dies": configuration("hosts", f"address:={ADDRESS}", "far:=wait_server.py", "far_args:=--die-after 0.01"),
+        "dies": configuration("hosts", f"address:={ADDRESS}", "far:=wait_server.py", "far_args:=--die-after 0"),
         "nowhere": configuration("hosts", "address:=192.0.2.1"),
         "near": configuration("near"),
         "held": configuration("hosts", f"address:={ADDRESS}", "far:=lived.py", f"far_args:={LIFE} 0"),
