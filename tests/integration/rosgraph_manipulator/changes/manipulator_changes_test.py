@@ -9,7 +9,8 @@ import subprocess
 import psutil
 import rospy
 import rostest
-from actionlib_msgs.msg import GoalStatus
+from actionlib.msg import TestActionGoal, TestGoal
+from actionlib_msgs.msg import GoalID, GoalStatus
 from dynamic_reconfigure.msg import Config
 from helpers.cases import case
 from helpers.waiting import DEADLINE_S, wait_for, wait_for_equal
@@ -65,6 +66,19 @@ class ChangesTest(PairTest):
     def usage(self):
         pair = [psutil.Process(node.pid) for node in (self.launcher, self.manipulator)]
         return sum(process.num_fds() for process in pair), sum(process.memory_info().rss for process in pair)
+
+    def test_goal_is_kept_though_the_server_has_rejected_newer_ones(self):
+        goal_id, _ = self.send_goal()
+        publisher = rospy.Publisher("wait/goal", TestActionGoal, queue_size=10)
+        self.addCleanup(publisher.unregister)
+        for node in ("/wait_server", "/rosgraph_manipulator"):
+            wait_for(lambda: publisher.impl.has_connection(node), f"{node} listens")  # noqa: B023
+        for name in ("", "odd", ""):
+            publisher.publish(TestActionGoal(goal_id=GoalID(id=name), goal=TestGoal(-1)))
+        wait_for(lambda: [*self.server_goals.values()].count(GoalStatus.REJECTED) == 3, "they are rejected")
+        old = self.server
+        self.assertEqual(self.request("fast"), 1, self.text)
+        self.wait_for_goal(goal_id, old)
 
     def test_parameters_are_set_while_the_nodes_run(self):
         self.assertEqual(self.request("tuned_1"), 1)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""An actionlib server: a goal of 0 is pending until cancelled, any other succeeds at once.
+"""An actionlib server: a goal of 0 is pending until cancelled, one below 0 is rejected, others succeed at once.
 
 Arguments make it misbehave: --exit-at-once, --hang, --stubborn, --die-after SECONDS, --port NUMBER, --waits-for FILE.
 With --passes-on ACTION it sends that action, its own one mostly, a goal of 0 for each message on `simple_goal`.
@@ -50,6 +50,9 @@ class Server(Sturdy, actionlib.ActionServer):
 
 
 def accept(handle):
+    if handle.get_goal().goal < 0:
+        handle.set_rejected()
+        return
     handle.set_accepted()
     if handle.get_goal().goal:
         handle.set_succeeded(TestResult(handle.get_goal().goal))

@@ -5,7 +5,9 @@ import pytest
 from actionlib import msg as actionlib_test_messages
 from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from rosgraph_manipulator.goals.clients import Client
-from rosgraph_manipulator.goals.goal_keeper import GoalKeeper
+from rosgraph_manipulator.goals.goal_keeper import LATE_STATUSES, GoalKeeper
+
+CLIENT = Client("/script", "http://host:1")
 
 
 def goal(goal_id, stamp=1):
@@ -117,6 +119,110 @@ def test_goal_without_an_id_takes_the_one_that_the_server_gave_it():
     assert keeper.pending.goal_id.id == "server-1"
 
 
+@pytest.mark.parametrize("names", [("b",), ("",), ("b", "c"), ("", ""), ("b", "")])
+@pytest.mark.parametrize("end", [result, status])
+def test_goal_is_kept_when_the_server_rejects_newer_ones(keeper, names, end):
+    keeper = GoalKeeper()
+    keeper.on_goal(goal("a"), CLIENT)
+    keeper.on_status(status("a", GoalStatus.ACTIVE))
+    for number, name in enumerate(names):
+        keeper.on_goal(goal(name, 2 + number))
+        keeper.on_status(status("a", GoalStatus.ACTIVE))  # published before the server heard of the newer one
+    for number, name in enumerate(names):
+        told = end(name or f"server-{number}", GoalStatus.REJECTED)
+        (keeper.on_result if end is result else keeper.on_status)(told)
+    assert (keeper.pending, keeper.client) == (goal("a"), CLIENT)
+    keeper.on_status(status("a", GoalStatus.ACTIVE))
+    assert keeper.is_delivered and not keeper.strays - {"a"}
+    keeper.on_result(result("a", GoalStatus.SUCCEEDED))
+    assert keeper.pending is None
+
+
+def test_adopted_goal_that_ended_meanwhile_does_not_come_back_when_a_newer_one_is_rejected():
+    keeper = GoalKeeper()
+    keeper.adopt(goal("a"))
+    keeper.on_goal(goal("b", 2))
+    keeper.on_result(result("b", GoalStatus.REJECTED))
+    keeper.on_status(status("b", GoalStatus.REJECTED))
+    assert keeper.pending is None
+
+
+def test_rejection_may_come_before_the_message_of_a_goal_without_an_id(keeper):
+    keeper.on_status(status("a", GoalStatus.ACTIVE))
+    keeper.on_result(result("server-1", GoalStatus.REJECTED))
+    keeper.on_goal(goal(""))
+    assert keeper.pending_id == "a"
+    keeper.on_goal(goal(""))  # another one
+    assert keeper.pending_id == ""
+    keeper.on_status(status("server-2", GoalStatus.ACTIVE))
+    assert keeper.pending_id == "server-2"
+
+
+def test_end_of_which_no_message_comes_is_no_end_of_a_much_later_goal(keeper):
+    keeper.on_status(status("a", GoalStatus.ACTIVE))
+    keeper.on_result(result("server-1", GoalStatus.REJECTED))
+    for _ in range(LATE_STATUSES):
+        keeper.on_status(status("server-1", GoalStatus.REJECTED))
+    keeper.on_goal(goal(""))
+    assert keeper.pending_id == ""
+
+
+def test_ends_from_before_the_keeper_are_none_of_a_goal_without_an_id():
+    keeper = GoalKeeper()
+    keeper.on_goal(goal(""))
+    keeper.on_status(status("server-1", GoalStatus.REJECTED))
+    keeper.on_status(status("server-2", GoalStatus.ACTIVE))
+    assert keeper.pending_id == "server-2"
+
+
+def test_goal_without_an_id_does_not_take_that_of_the_goal_that_it_replaces(keeper):
+    keeper.on_goal(goal(""))
+    keeper.on_status(status("a", GoalStatus.ACTIVE))
+    keeper.on_result(result("a", GoalStatus.PREEMPTED))
+    keeper.on_status(status("server-1", GoalStatus.ACTIVE))
+    assert keeper.pending_id == "server-1"
+
+
+@pytest.mark.parametrize("name", ["b", ""])
+def test_flood_of_goals_that_are_rejected_leaves_the_one_at_work(keeper, name):
+    keeper.on_status(status("a", GoalStatus.ACTIVE))
+    for number in range(100):
+        keeper.on_goal(goal(name and f"{name}{number}", 2))
+    for number in range(100):
+        keeper.on_result(result(f"{name or 'server'}{number}", GoalStatus.REJECTED))
+    assert keeper.pending_id == "a"
+
+
+def test_message_with_the_id_of_the_pending_goal_does_not_change_it(keeper):
+    keeper.on_goal(goal("a", 7))
+    assert keeper.pending == goal("a")
+
+
+@pytest.mark.parametrize("cancel", [GoalID(), GoalID(id="a"), GoalID(stamp=genpy.Time(1))])
+def test_cancelled_goal_does_not_come_back_when_a_newer_one_is_rejected(keeper, cancel):
+    keeper.on_goal(goal("b", 2))
+    keeper.on_cancel(cancel)
+    keeper.on_result(result("b", GoalStatus.REJECTED))
+    assert keeper.pending is None
+
+
+@pytest.mark.parametrize("state", [GoalStatus.SUCCEEDED, GoalStatus.ABORTED, GoalStatus.PREEMPTED])
+def test_goal_that_another_one_has_replaced_does_not_come_back_when_that_one_ends(keeper, state):
+    keeper.on_goal(goal("b", 2))
+    keeper.on_result(result("b", state))
+    assert keeper.pending is None
+
+
+def test_goal_that_another_one_has_replaced_does_not_come_back_when_a_later_one_is_rejected(keeper):
+    keeper.on_goal(goal("b", 2))
+    keeper.on_status(status("b", GoalStatus.ACTIVE))
+    keeper.on_goal(goal("c", 3))
+    keeper.on_result(result("c", GoalStatus.REJECTED))
+    assert keeper.pending_id == "b"
+    keeper.on_result(result("b", GoalStatus.REJECTED))
+    assert keeper.pending is None
+
+
 def test_adopted_goal_is_kept_while_the_server_has_it_at_work():
     keeper = GoalKeeper()
     keeper.adopt(goal("a"))
@@ -212,9 +318,6 @@ def test_goal_that_was_cancelled_meanwhile_is_not_sent(keeper):
     keeper.server_changes(False)
     assert keeper.to_send(10.0) is None
     assert keeper.is_delivered
-
-
-CLIENT = Client("/script", "http://host:1")
 
 
 def waited_for(client=CLIENT):

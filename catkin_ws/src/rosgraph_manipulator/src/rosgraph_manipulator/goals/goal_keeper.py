@@ -25,6 +25,10 @@ REPEATS = 3
 """How often a goal is repeated after its server died although nobody is known to wait: as often as the launcher starts
 a node again by default, before the configuration fails and the next one gets the goal."""
 CONFIRMATIONS = 3  # statuses with a goal at work, every 0.2 s: more than a server needs to heed a cancellation
+ENDS_OF_THE_NEWEST = frozenset({GoalStatus.REJECTED, GoalStatus.SUCCEEDED, GoalStatus.ABORTED})
+"""How a goal ends by itself; the others are replaced or cancelled."""
+MOST_EARLIER = 10  # goals that the server may go back to: it has one at work, and rejects a goal within milliseconds
+LATE_STATUSES = 5  # every 0.2 s: the message of a goal does not come later than that after its end
 
 
 class GoalKeeper:
@@ -37,6 +41,13 @@ class GoalKeeper:
         self._is_repeat = False  # whether sending it to the next server counts as such
         self._finished: OrderedDict[str, None] = OrderedDict()
         self._replaced: OrderedDict[str, None] = OrderedDict()
+        # Goals that were replaced, with their clients and whether they are doubted, until the newer one is at work.
+        # Where the server rejects that, it goes on with what it had.
+        self._earlier: OrderedDict[str, tuple[Any, Client | None, bool]] = OrderedDict()
+        # Goals of which the end has come, but no message yet, with how many statuses may come before it. One without an
+        # id can't be told from others by its message.
+        self._nameless: OrderedDict[str, int] = OrderedDict()
+        self._has_status = False  # whether a status has come: what ended before is known
         self._changing = False
         self._doubted = False  # the goal was known to an earlier keeper: the server has to confirm it
         self._listed: frozenset[str] = frozenset()
@@ -137,30 +148,48 @@ class GoalKeeper:
         return self.pending
 
     def on_goal(self, goal: Any, client: Client | None = None) -> None:
-        """Process a message of the topic `goal`; a newer goal replaces the pending one.
+        """Process a message of the topic `goal`; a newer goal replaces the pending one, unless the server rejects it.
 
         Args:
             goal: the message.
             client: who waits for it; None: nobody who is known, or it is a goal that was sent before.
         """
-        if goal.goal_id.id and goal.goal_id.id in self._finished:
+        goal_id = goal.goal_id.id
+        if goal_id and goal_id in self._finished:
+            self._nameless.pop(goal_id, None)
             return
-        if client or not goal.goal_id.id or goal.goal_id.id != self.pending_id:
-            self._client, self._repeats, self._is_repeat = client, 0, False
-        if self.pending_id and self.pending_id != goal.goal_id.id:
+        if not goal_id and self._nameless:
+            self._nameless.popitem(last=False)  # the server has named it, and told its end, before it came here
+            return
+        is_newer = not goal_id or goal_id != self.pending_id
+        if is_newer and self.pending_id:
             _remember(self._replaced, self.pending_id)
-        self._goal, self._doubted, self._cancelled = copy.deepcopy(goal), False, None
+            self._earlier[self.pending_id] = self._goal, self._client, self._doubted
+            if len(self._earlier) > MOST_EARLIER:
+                at_work = self._listed & self._earlier.keys()
+                self._earlier.pop(next(one for one in self._earlier if one not in at_work or len(at_work) > 1))
+        if is_newer or client:
+            self._client, self._repeats, self._is_repeat = client, 0, False
+        if is_newer:
+            self._earlier.pop(goal_id, None)
+            self._goal = copy.deepcopy(goal)
+        self._doubted, self._cancelled = False, None
 
     def on_status(self, status: Any) -> None:
         """Process a message of the topic `status`: goals end, and a goal that was sent without an id gets one."""
         self._listed = frozenset(entry.goal_id.id for entry in status.status_list if entry.status in AT_WORK)
+        self._nameless = OrderedDict((goal_id, left - 1) for goal_id, left in self._nameless.items() if left > 1)
         for entry in status.status_list:
             goal_id, state = entry.goal_id.id, entry.status
             if state in TERMINAL:
                 self._end(goal_id, state)
-            elif self._goal is not None and not self._goal.goal_id.id and state in AT_WORK:
+                continue
+            if self._is_without_id and state in AT_WORK and not self._is_known(goal_id):
                 # The server made up an id for a goal that came without one.
                 self._goal.goal_id.id, self._goal.goal_id.stamp = goal_id, entry.goal_id.stamp
+            if state == GoalStatus.ACTIVE and goal_id == self.pending_id:
+                self._earlier.clear()
+        self._has_status = True
         self._doubt_cancellation()
         if self._doubted and not self._changing:
             if not self.is_at_work:
@@ -191,30 +220,56 @@ class GoalKeeper:
 
     def on_cancel(self, cancel: Any) -> None:
         """Process a message of the topic `cancel`, by actionlib's rules: by id, up to a time, or all."""
-        if self._goal is None:
-            return
-        goal_id = self._goal.goal_id
-        cancelled = cancel.id == goal_id.id if cancel.id else cancel.stamp.is_zero()
-        if not cancel.stamp.is_zero() and goal_id.stamp <= cancel.stamp:
-            cancelled = True
-        if cancelled:
+        for goal, *_ in [*self._earlier.values()]:
+            if _is_cancelled(goal.goal_id, cancel):
+                self._finish(goal.goal_id.id)
+        if self._goal is not None and _is_cancelled(self._goal.goal_id, cancel):
             self._cancelled, self._confirmations = None if self._changing else self._goal, 0
-            self._finish(goal_id.id)
+            self._finish(self._goal.goal_id.id)
 
     def drop(self) -> None:
         """Let the pending goal be over."""
         if self._goal is not None:
             self._finish(self._goal.goal_id.id)
 
+    @property
+    def _is_without_id(self) -> bool:
+        """Whether the pending goal came without an id, and the server has not told yet which one it gave it."""
+        return self._goal is not None and not self._goal.goal_id.id
+
     def _end(self, goal_id: str, state: int) -> None:
         if self._changing and state in DROPPED_BY_SHUTDOWN:
             return
-        self._finish(goal_id)  # also one not known yet: a result may arrive here before its goal
+        if self._has_status and state in ENDS_OF_THE_NEWEST and not self._is_known(goal_id):
+            if self._is_without_id:
+                self._goal.goal_id.id = goal_id
+            else:
+                self._nameless[goal_id] = LATE_STATUSES
+        is_rejected = state == GoalStatus.REJECTED and goal_id == self.pending_id
+        earlier = next(reversed(self._earlier.values()), None) if is_rejected else None
+        self._finish(goal_id, is_rejected)  # also one not known yet: a result may arrive here before its goal
+        if earlier is not None:
+            self._goal, self._client, self._doubted = earlier  # the server goes on with it
+            del self._earlier[self._goal.goal_id.id]
+            self._repeats, self._is_repeat = 0, False
 
-    def _finish(self, goal_id: str) -> None:
+    def _is_known(self, goal_id: str) -> bool:
+        """Tell whether a message of a goal has come, or its end."""
+        return goal_id == self.pending_id or goal_id in self._replaced or goal_id in self._finished
+
+    def _finish(self, goal_id: str, is_rejected: bool = False) -> None:
+        self._earlier.pop(goal_id, None)
         if goal_id == self.pending_id:
             self._goal = None
+            if not is_rejected:
+                self._earlier.clear()
         _remember(self._finished, goal_id)
+
+
+def _is_cancelled(goal_id: Any, cancel: Any) -> bool:
+    """Tell whether a cancellation is of a goal, by actionlib's rules."""
+    by_time = not cancel.stamp.is_zero() and goal_id.stamp <= cancel.stamp
+    return bool(by_time or (cancel.id == goal_id.id if cancel.id else cancel.stamp.is_zero()))
 
 
 def _remember(ids: OrderedDict[str, None], goal_id: str) -> None:

@@ -3,7 +3,8 @@
 As long as the goal is pending, it is stored in the parameter `ACTION/resume_goal`. A server that knows the parameter
 continues the goal before it publishes its first status. Where it deletes the parameter, the goal is stored again, since
 that server may die, too. `~kept_goals` has the same goal for a manipulator that is started again: the former one may
-have died just after a server took the goal.
+have died just after a server took the goal. A goal that came without an id is stored when the server has named it and
+works at it, or is replaced.
 """
 
 from __future__ import annotations
@@ -173,7 +174,8 @@ class PendingGoal:
     def _store(self, again: bool = False) -> None:
         """Update the parameters."""
         goal_id = self._keeper.pending_id
-        if goal_id == self._stored and not (again and goal_id is not None):
+        is_unnamed = goal_id == "" and not self._keeper.server_is_changing
+        if (goal_id == self._stored or is_unnamed) and not (again and goal_id is not None):
             return
         with contextlib.suppress(rospy.ROSException, OSError):  # without a master there is nothing to keep it for
             if goal_id is None:
