@@ -244,7 +244,7 @@ class GoalKeeper:
             if self._is_without_id:
                 self._goal.goal_id.id = goal_id
             else:
-                self._nameless[goal_id] = LATE_STATUSES
+                _remember(self._nameless, goal_id, LATE_STATUSES)
         is_rejected = state == GoalStatus.REJECTED and goal_id == self.pending_id
         earlier = next(reversed(self._earlier.values()), None) if is_rejected else None
         self._finish(goal_id, is_rejected)  # also one not known yet: a result may arrive here before its goal
@@ -272,8 +272,8 @@ def _is_cancelled(goal_id: Any, cancel: Any) -> bool:
     return bool(by_time or (cancel.id == goal_id.id if cancel.id else cancel.stamp.is_zero()))
 
 
-def _remember(ids: OrderedDict[str, None], goal_id: str) -> None:
-    """Add an id; the oldest ones are forgotten."""
-    ids[goal_id] = None
+def _remember(ids: OrderedDict[str, Any], goal_id: str, what: Any = None) -> None:
+    """Add an id, with what is known of it; the oldest ones are forgotten."""
+    ids[goal_id] = what
     if len(ids) > REMEMBERED:
         ids.popitem(last=False)
