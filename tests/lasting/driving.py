@@ -191,6 +191,7 @@ class Drive:
 
     def _strike(self, one: Fault, system: subprocess.Popen[bytes], table: ProcessTable, striker: Striker) -> None:
         undo: Undo | None
+        struck = self.lines.t
         try:
             note, undo = striker.strike(one)
         except LeftOutError:
@@ -202,7 +203,7 @@ class Drive:
         over, stretch = time.monotonic(), max(1.0, self._stretch)
         seconds = self._well_after(over, WELL_S * stretch, system, table)
         hit = ", ".join(filter(None, (*one.targets, one.how)))
-        self.lines.write("recovery", self.lines.t, one.kind.name, f"{hit}: {note}", seconds)
+        self.lines.write("recovery", self.lines.t, one.kind.name, f"{hit}: {note}", seconds, struck)
 
     def _well_after(
         self, begin: float, longest: float, system: subprocess.Popen[bytes], table: ProcessTable

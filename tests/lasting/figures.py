@@ -34,16 +34,20 @@ class Reading(NamedTuple):
 
 
 class Recovery(NamedTuple):
-    """A fault that was over at `t`, and how long it took until all was well again; s, None: it was not."""
+    """A fault that struck at `struck`, s, all of which was over at `t`, s.
+
+    `seconds` is how long it took from the end of the fault until all was well again; None: it was not.
+    """
 
     t: float
     kind: str
     note: str
     seconds: float | None
+    struck: float
 
 
 class Goal(NamedTuple):
-    """How a goal ended at `t`: succeeded, aborted, preempted, lost or late."""
+    """How a goal ended at `t`: succeeded, late, or in another way that actionlib has a name for."""
 
     t: float
     outcome: str
@@ -148,7 +152,32 @@ def broken(run: Run) -> list[str]:
                 f"{one.descriptors[1]:g} descriptors, {one.threads[0]:g} to {one.threads[1]:g} threads"
             )
     found += [f"not well again after {one.kind} ({one.note})" for one in run.recoveries if one.seconds is None]
+    found += [
+        f"a goal ended at {goal.t:.0f} s as {goal.outcome}, which nothing explains that struck then"
+        for goal in run.goals
+        if goal.outcome != REACHED and not any(_explains(one, goal) for one in run.recoveries)
+    ]
     return found
+
+
+REACHED = "succeeded"
+"""How a goal ends that is reached."""
+_OBEYED: dict[str, tuple[str, ...]] = {
+    "/move_base/cancel": ("preempted", "recalled"),
+    "/move_base/goal": ("preempted", "recalled"),
+    "/move_base_simple/goal": ("preempted", "recalled"),
+    "/move_base/status": ("lost",),
+    "/tf": ("aborted",),
+}
+"""By topic: how goals may end on which wrong words are published there, because all clients and servers obey them."""
+
+
+def _explains(one: Recovery, goal: Goal) -> bool:
+    """Tell whether a goal ended as it did because somebody published wrong words just then."""
+    told = one.note.replace(",", "").split()
+    return one.struck <= goal.t <= one.t and any(
+        topic in told and goal.outcome in outcomes for topic, outcomes in _OBEYED.items()
+    )
 
 
 def progress(runs: Sequence[Run], hours: float) -> str:

@@ -18,11 +18,20 @@ from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from node_kit.io.input_files import read_yaml
 from robot_formulas.geometry import Pose, quaternion_of
 
+from lasting.figures import REACHED
+
 NEAREST = 5.0
 """m from one goal to the next, at least."""
 LATEST = 300.0
 """ROS s after which a goal is given up."""
-_OUTCOMES = {GoalStatus.SUCCEEDED: "succeeded", GoalStatus.ABORTED: "aborted", GoalStatus.PREEMPTED: "preempted"}
+_OUTCOMES = {
+    GoalStatus.SUCCEEDED: REACHED,
+    GoalStatus.ABORTED: "aborted",
+    GoalStatus.PREEMPTED: "preempted",
+    GoalStatus.RECALLED: "recalled",
+    GoalStatus.REJECTED: "rejected",
+    GoalStatus.LOST: "lost",
+}
 
 
 def main() -> None:
@@ -54,7 +63,8 @@ def send(client: actionlib.ActionClient, pose: Pose) -> str:
     began = rospy.get_time()
     while not rospy.is_shutdown() and rospy.get_time() - began < LATEST:
         if handle.get_comm_state() == actionlib.CommState.DONE:
-            return _OUTCOMES.get(handle.get_goal_status(), "lost")
+            status = handle.get_goal_status()
+            return _OUTCOMES.get(status, f"status-{status}")
         time.sleep(0.1)
     handle.cancel()
     return "late"

@@ -43,16 +43,45 @@ def test_only_processes_that_lived_all_the_time_are_compared():
 
 
 def test_fault_after_which_all_is_not_well_is_broken():
-    recoveries = [Recovery(5.0, "KILL", "move_base", 1.5), Recovery(60.0, "USURP", "move_base", None)]
+    recoveries = [Recovery(5.0, "KILL", "move_base", 1.5, 1.0), Recovery(60.0, "USURP", "move_base", None, 2.0)]
     assert broken(Run(recoveries=recoveries, end=End(90.0, ["left"]))) == [
         "left",
         "not well again after USURP (move_base)",
     ]
 
 
+CANCEL = Recovery(60.0, "DATA", "nan: /move_base/cancel, nan", 0.0, 50.0)
+STATUS = Recovery(60.0, "DATA", "flood: /move_base/status, flood", 0.0, 50.0)
+POSE = Recovery(60.0, "DATA", "nan: /tf, nan", 0.0, 50.0)
+KILL = Recovery(60.0, "KILL", "move_base: /move_base/cancelled", 1.0, 50.0)
+
+
+@pytest.mark.parametrize(
+    ("goal", "struck", "explained"),
+    [
+        (Goal(55.0, "succeeded", 40.0), KILL, True),
+        (Goal(55.0, "preempted", 40.0), CANCEL, True),
+        (Goal(55.0, "lost", 40.0), STATUS, True),
+        (Goal(55.0, "aborted", 40.0), POSE, True),
+        (Goal(49.0, "preempted", 40.0), CANCEL, False),
+        (Goal(61.0, "preempted", 40.0), CANCEL, False),
+        (Goal(55.0, "rejected", 40.0), CANCEL, False),
+        (Goal(55.0, "lost", 40.0), CANCEL, False),
+        (Goal(55.0, "preempted", 40.0), STATUS, False),
+        (Goal(55.0, "late", 300.0), POSE, False),
+        (Goal(55.0, "aborted", 40.0), KILL, False),
+        (Goal(55.0, "preempted", 40.0), KILL, False),
+        (Goal(55.0, "status-8", 40.0), STATUS, False),
+    ],
+)
+def test_goal_that_ends_otherwise_than_what_struck_explains_is_broken(goal, struck, explained):
+    expected = [f"a goal ended at {goal.t:.0f} s as {goal.outcome}, which nothing explains that struck then"]
+    assert broken(Run(recoveries=[struck], goals=[goal], end=End(90.0, []))) == ([] if explained else expected)
+
+
 def test_progress_is_that_of_all_runs():
-    lives = [run(life("reasoner", 1, lambda t: 60.0), recoveries=[Recovery(5.0, "KILL", "", 1.5)])] * 2
-    lives.append(Run(recoveries=[Recovery(9.0, "USURP", "", None)], end=End(1600.0, [])))
+    lives = [run(life("reasoner", 1, lambda t: 60.0), recoveries=[Recovery(5.0, "KILL", "", 1.5, 1.0)])] * 2
+    lives.append(Run(recoveries=[Recovery(9.0, "USURP", "", None, 1.0)], end=End(1600.0, [])))
     assert progress(lives, 8.0) == "1.00 of 8 h, 3 faults, 1 after which not all was well again"
 
 
@@ -60,7 +89,11 @@ def test_report_has_what_was_written(tmp_path):
     path = tmp_path / "run-0.jsonl"
     lines = [line("reading", reading) for reading in life("reasoner", 1, lambda t: 60.0)]
     lines += [line("goal", Goal(50.0, "succeeded", 40.0)), line("goal", Goal(90.0, "succeeded", 38.0))]
-    lines += [line("recovery", Recovery(10.0, "KILL", "", 2.0)), line("stretch", (1.5,)), line("end", End(1000.0, []))]
+    lines += [
+        line("recovery", Recovery(10.0, "KILL", "", 2.0, 7.0)),
+        line("stretch", (1.5,)),
+        line("end", End(1000.0, [])),
+    ]
     path.write_text("".join(lines) + '["reading", 10')
     told = report([read(path)], "abc", 7)
     assert "1 systems of seed 7 on code abc, 0.28 h, 1 faults\ngoals: succeeded 2\n" in told

@@ -20,6 +20,7 @@ import rospy
 
 from node_kit.io.forgiving_logs import forgive
 from node_kit.io.master_watch import MasterWatch
+from node_kit.io.memory_arenas import limit_arenas
 from node_kit.io.printable_logs import print_safely
 from node_kit.io.xml_rpc import CallError
 from node_kit.master import View
@@ -91,6 +92,7 @@ class Lifetime:
         self._status = 0
         self._last_start: LastStart | None = None
         self._shutting_down: int | None = None  # the thread in which rospy shuts down
+        limit_arenas()
         # Begun now, because there may be no thread to be had when the node is to end.
         threading.Thread(target=self._cut_off_in_time, name="cut off", daemon=True).start()
 
