@@ -14,7 +14,7 @@ FILES: dict[str, str] = {
     "metacontrol_bags/cli/info.py": _COMMAND,
     "metacontrol_dashboard/io/page.py": _OWN,
     "metacontrol_dashboard/ros/dashboard.py": "deserialises what rospy has received; what follows is tried",
-    "metacontrol_dashboard/state/pictures.py": "is not tried yet: compressed images of a camera",
+    "metacontrol_dashboard/state/pictures.py": "its conversions are tried with the dashboard",
     "metacontrol_experiments/campaign/progress.py": _CALLED,
     "metacontrol_experiments/cli/campaign.py": _COMMAND,
     "metacontrol_experiments/cli/options.py": _COMMAND,

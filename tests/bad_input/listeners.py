@@ -58,6 +58,7 @@ from sensor_msgs.msg import (
     BatteryState,
     CameraInfo,
     ChannelFloat32,
+    CompressedImage,
     Illuminance,
     Image,
     Imu,
@@ -675,7 +676,7 @@ def _dashboard(_ros: Ros) -> Callable[[], object]:
     from metacontrol_dashboard.ros.dashboard import DashboardNode
     from metacontrol_dashboard.ros.reasoner import ReasonerFollower
     from metacontrol_dashboard.state.feed import Feed
-    from metacontrol_dashboard.state.places import COSTMAP, GOAL, MAP, POSE, WAY
+    from metacontrol_dashboard.state.places import CAMERA, COSTMAP, GOAL, MAP, POSE, WAY
     from metacontrol_dashboard.state.store import Store
 
     node = object.__new__(DashboardNode)
@@ -685,8 +686,9 @@ def _dashboard(_ros: Ros) -> Callable[[], object]:
     node._reasoner = ReasonerFollower(node._store, node._feed, node._lock)
     node._listen()
     kinds = {MAP: OccupancyGrid, COSTMAP: OccupancyGrid, POSE: Odometry, WAY: PathMessage, GOAL: MoveBaseActionGoal}
-    for role, kind in kinds.items():
-        rospy.Subscriber(f"place/{role}", kind, lambda message, role: node._on_place(role, message), role)
+    topics = [(role, role, kind) for role, kind in kinds.items()]
+    for topic, role, kind in (*topics, ("image", CAMERA, Image), ("compressed", CAMERA, CompressedImage)):
+        rospy.Subscriber(f"place/{topic}", kind, lambda message, role: node._on_place(role, message), role)
 
     def settle() -> None:
         import json
@@ -711,6 +713,18 @@ def _dashboard_good() -> list[tuple[str, Any]]:
         ("/place/pose", _odometry()),
         ("/place/way", _stamped(PathMessage(poses=[_pose("map")] * 3), "map")),
         ("/place/goal", _goal()),
+    ]
+
+
+def _pictures() -> list[tuple[str, Any]]:
+    import cv2
+
+    shades = np.linspace(0, 255, 24 * 32 * 3).astype(np.uint8).reshape(24, 32, 3)
+    packed = {kind: cv2.imencode(f".{kind}", shades)[1].tobytes() for kind in ("jpeg", "png")}
+    images = [_image("rgb8", size=3), _image("bayer_rggb8"), _image("16UC1", size=2), _image("32FC1", size=4)]
+    return [
+        *(("/place/image", image) for image in images),
+        *(("/place/compressed", CompressedImage(format=kind, data=data)) for kind, data in packed.items()),
     ]
 
 
@@ -887,6 +901,7 @@ LISTENERS: tuple[Listener, ...] = (
         share=0.5,
     ),
     Listener("the dashboard", ("metacontrol_dashboard/ros/dashboard.py",), _dashboard, _dashboard_good),
+    Listener("the dashboard's camera", ("metacontrol_dashboard/ros/dashboard.py",), _dashboard, _pictures),
     Listener("a reasoner's journal", ("metacontrol_dashboard/ros/reasoner.py",), _dashboard, _journals, share=0.1),
     Listener(
         "the work cell", ("metacontrol_manipulation/ros/robot.py", "metacontrol_manipulation/ros/places.py",

@@ -127,7 +127,8 @@ def _bad(rng: Random, type_name: str, value: Any) -> Any:  # noqa: PLR0911
 def _bad_array(rng: Random, type_name: str, value: Any) -> Any:  # noqa: PLR0911
     inner, _, size = type_name.rstrip("]").partition("[")
     if isinstance(value, bytes):
-        return rng.choice((b"", value[:-1], value + b"\0", value * 2, b"\xff" * len(value), bytes(70_000)))
+        inside = mutated(rng, [value], "binary")
+        return rng.choice((b"", value[:-1], value + b"\0", value * 2, b"\xff" * len(value), bytes(70_000), inside))
     items = list(value)
     if size:
         place = rng.randrange(len(items))

@@ -269,7 +269,7 @@ _LAUNCHED = _texts(
     """<launch><machine name="m" address="localhost" user="u" env-loader="/e"/>
   <node machine="m" pkg="node_kit" type="listener.py" name="l" unless="false"/>
   <test test-name="t" pkg="node_kit" type="x" name="x"/>
-  <include file="$(find rosgraph_launcher)/launch/launcher.launch" pass_all_args="true"></include></launch>
+  <include file="$(find rosgraph_monitor)/launch/aggregator.launch" pass_all_args="true"></include></launch>
 """,
     """<launch><node pkg="nodelet" type="nodelet" name="manager" args="manager"/>
   <node pkg="nodelet" type="nodelet" name="n" args="load bad/N manager _x:=1 in:=out __name:=z"/></launch>

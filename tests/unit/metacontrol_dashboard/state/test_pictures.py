@@ -102,6 +102,12 @@ def test_compressed_image():
     assert np.abs(seen(Thing(format="png", data=data)) - ORANGE).max() < 12
 
 
+@pytest.mark.parametrize(("kind", "shown"), [(".png", True), (".jpg", True), (".bmp", False), (".tiff", False)])
+def test_only_what_cameras_are_compressed_to_is_decoded(kind, shown):
+    data = cv2.imencode(kind, whole(ORANGE[::-1]))[1].tobytes()
+    assert bool(picture(Thing(format=kind, data=data))) is shown
+
+
 @pytest.mark.parametrize(
     "message",
     [

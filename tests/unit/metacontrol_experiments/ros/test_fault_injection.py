@@ -13,8 +13,9 @@ from helpers.waiting import wait_for
 from metacontrol_experiments.contingency.contingency import AT_START, InjectionError
 from metacontrol_experiments.contingency.parsing import make, parse_contingency
 from metacontrol_experiments.io import node_processes
-from metacontrol_experiments.ros import fault_injection, services
+from metacontrol_experiments.ros import fault_injection
 from metacontrol_experiments.ros.fault_injection import FaultInjector
+from node_kit.ros import services
 
 NODE = """
 import os, sys

@@ -15,7 +15,7 @@ from mros1_reasoner.knowledge.reasoner import ReasonerError
 from mros1_reasoner.loop.readable_state import MapeError
 from mros1_reasoner.replay.recording import RecordingError
 from node_kit.io.background import NoThreadError, in_background
-from node_kit.ros.service_failures import SERVICE_FAILURES
+from node_kit.ros.services import SERVICE_FAILURES
 from rosgraph_manipulator.ros import client
 from std_srvs.srv import Trigger
 

@@ -17,6 +17,7 @@ from metacontrol_sim.srv import (
 )
 from nav_msgs.msg import OccupancyGrid
 from node_kit.io.xml_rpc import CallError
+from node_kit.ros.services import call
 from pybullet_simulator.io.fault_signals import SIGNALS
 from pybullet_simulator.messages.grid import GridMessageError, read_grid
 from pybullet_simulator.robot.faults import Fault
@@ -28,7 +29,6 @@ from simulator_msgs.srv import SetLight, SpawnObstacle
 from metacontrol_experiments.contingency.contingency import AT_START, InjectionError, Kind
 from metacontrol_experiments.contingency.parsing import ComponentError, ContingencyError, make, node_of
 from metacontrol_experiments.io.node_processes import NodeProcessError, pid_of
-from metacontrol_experiments.ros.services import call
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

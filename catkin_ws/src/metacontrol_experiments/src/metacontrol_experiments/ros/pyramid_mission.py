@@ -16,6 +16,7 @@ from metacontrol_bags import messages
 from metacontrol_bags.goal_status import GoalStatus
 from metacontrol_manipulation.msg import BuildPyramidActionFeedback, BuildPyramidActionGoal, BuildPyramidActionResult
 from metacontrol_msgs.msg import MissionEvent
+from node_kit.ros.services import call
 from simulator_msgs.msg import ArmState
 from simulator_msgs.srv import DeleteObstacle, SpawnObstacle
 from std_srvs.srv import Trigger
@@ -30,7 +31,6 @@ from metacontrol_experiments.pyramid.summary import IN_PLACE, placed
 from metacontrol_experiments.ros.fault_injection import FaultInjector, Injected
 from metacontrol_experiments.ros.goal import MissionGoal
 from metacontrol_experiments.ros.mission_node import MissionNode
-from metacontrol_experiments.ros.services import call
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -14,6 +14,7 @@ from metacontrol_msgs import msg
 from metacontrol_msgs.srv import LastDecisions, LastDecisionsResponse
 from node_kit.io.xml_rpc import CallError
 from node_kit.ros import command
+from node_kit.ros.services import SERVICE_FAILURES, call_within
 
 from mros1_reasoner.replay.recording import RecordingError
 from mros1_reasoner.ros.messages import fill_decision
@@ -67,10 +68,9 @@ def last_decisions(topic: str, count: int, wait: float) -> list[Decision]:
     _join()
     name = rospy.resolve_name(topic) + _PLURAL
     try:
-        rospy.wait_for_service(name, max(_FIND_TIMEOUT, wait))
-        found = rospy.ServiceProxy(name, LastDecisions)(count).decisions
-    except (OSError, rospy.ROSException, rospy.ServiceException) as error:
-        raise RecordingError(f"{name} does not answer: no reasoner runs there; start it, or name a bag") from error
+        found = call_within(max(_FIND_TIMEOUT, wait), name, LastDecisions, count).decisions
+    except SERVICE_FAILURES as error:
+        raise RecordingError(f"{error}: no reasoner runs there, or it hangs; start it, or name a bag") from error
     return [messages.decision(message, rospy.get_time()) for message in found]
 
 

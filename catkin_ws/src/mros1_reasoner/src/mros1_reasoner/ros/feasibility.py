@@ -6,6 +6,7 @@ import rospy
 from metacontrol_msgs.srv import Feasible
 from node_kit.io.xml_rpc import CallError
 from node_kit.ros import command
+from node_kit.ros.services import SERVICE_FAILURES, call_within
 
 from mros1_reasoner.replay.recording import RecordingError
 
@@ -19,7 +20,7 @@ def feasible_now(node: str, function: str, wait: float) -> dict[str, list[str]]:
         wait: for the service, s.
 
     Raises:
-        RecordingError: there is no master, no such node, or no such function.
+        RecordingError: there is no master, no such node, it does not answer in time, or there is no such function.
     """
     try:
         command.join("feasible")
@@ -27,10 +28,9 @@ def feasible_now(node: str, function: str, wait: float) -> dict[str, list[str]]:
         raise RecordingError(f"{error}: start roscore or set ROS_MASTER_URI") from error
     name = rospy.resolve_name(f"{node}/feasible")
     try:
-        rospy.wait_for_service(name, wait)
-        answer = rospy.ServiceProxy(name, Feasible)(function)
-    except (OSError, rospy.ROSException, rospy.ServiceException) as error:
-        raise RecordingError(f"{name} does not answer within {wait:g} s: no reasoner runs ({error})") from error
+        answer = call_within(wait, name, Feasible, function)
+    except SERVICE_FAILURES as error:
+        raise RecordingError(f"{name} does not answer: no reasoner runs, or it is busy ({error})") from error
     if not answer.ok:
         raise RecordingError(answer.message)
     return {found.function: list(found.designs) for found in answer.functions}

@@ -21,7 +21,7 @@ from metacontrol_msgs.srv import (
     StandByRequest,
 )
 from node_kit.io.background import NoThreadError, in_background, start_thread
-from node_kit.ros.service_failures import SERVICE_FAILURES
+from node_kit.ros.services import SERVICE_FAILURES
 from rosgraph_launcher.description import NodeDescription
 from rosgraph_launcher.hosts import no_launcher
 from rosgraph_launcher.io.master import NodeApi

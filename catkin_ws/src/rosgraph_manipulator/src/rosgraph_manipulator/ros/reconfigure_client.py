@@ -20,7 +20,7 @@ from dynamic_reconfigure.msg import (
 from dynamic_reconfigure.srv import Reconfigure
 from node_kit.io.background import in_background
 from node_kit.io.xml_rpc import CallError
-from node_kit.ros.service_failures import SERVICE_FAILURES
+from node_kit.ros.services import SERVICE_FAILURES
 from rosgraph_launcher.io.master import NodeApi
 
 from rosgraph_manipulator.change.deployment import DeploymentError

@@ -19,7 +19,7 @@ import rospy
 from metacontrol_msgs.msg import RepairAction, RepairResult
 from node_kit.io.background import NoThreadError, in_background, start_thread
 from node_kit.io.inbox import Inbox
-from node_kit.ros.service_failures import SERVICE_FAILURES
+from node_kit.ros.services import SERVICE_FAILURES
 from rosservice import ROSServiceException, get_service_type
 from std_srvs.srv import Empty, Trigger
 

@@ -13,7 +13,7 @@ from typing import Any
 import rospy
 from geometry_msgs.msg import Twist
 from node_kit.io.background import NoThreadError
-from node_kit.ros.service_failures import SERVICE_FAILURES
+from node_kit.ros.services import SERVICE_FAILURES
 from rosgraph_launcher.description import NodeDescription
 from rosgraph_launcher.io.command_lines import CommandLineError, command_line
 from rosgraph_launcher.io.master import NodeApi, advertised

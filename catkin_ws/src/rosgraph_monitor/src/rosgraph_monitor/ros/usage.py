@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import rospy
 from metacontrol_msgs.srv import ReadUsage
 from node_kit.io.background import in_background
-from node_kit.ros.service_failures import SERVICE_FAILURES
+from node_kit.ros.services import SERVICE_FAILURES
 from rosgraph_launcher.io.ownership import is_this_host
 from rosgraph_launcher.io.this_host import resolved as addresses_of
 from rosgraph_launcher.io.usage import read_sample
