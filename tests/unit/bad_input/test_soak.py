@@ -4,6 +4,7 @@ import contextlib
 import os
 import signal
 import sys
+import tracemalloc
 from pathlib import Path
 from random import Random
 
@@ -31,6 +32,15 @@ def test_inputs_are_the_same_each_time_and_differ_from_each_other(kind):
     assert made_once == made_again
     assert len(set(made_once)) > 100
     assert max(map(len, made_once)) <= LARGEST
+
+
+def test_large_inputs_take_little_to_make():
+    tracemalloc.start()
+    for n in range(300):
+        mutated(Random(n), [bytes(LARGEST)], "binary")
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 50 * LARGEST
 
 
 def test_values_that_are_put_into_trees_are_not_changed_with_them():
