@@ -76,21 +76,31 @@ def pose_in(target: str, stamped: PoseStamped, frames: Transformer) -> Pose | No
 
 
 class _Listener(tf2_ros.TransformListener):
-    """A listener that leaves out transforms whose stamp tf2 can't hold."""
+    """A listener that leaves out what tf2 can't hold, and what would shut out all that comes after it.
+
+    tf2 ignores what is older by `TF_CACHE` than the newest transform of a frame: one message from farther in the future
+    would leave the robot without that frame until then.
+    """
 
     def callback(self, data: Any) -> None:
         """Take transforms."""
-        super().callback(_with_sound_stamps(data))
+        now = rospy.get_time()  # 0: simulated time has not begun
+        super().callback(_before(min(_SECONDS, now + TF_CACHE) if now else _SECONDS, data))
 
     def static_callback(self, data: Any) -> None:
         """Take transforms that never change."""
-        super().static_callback(_with_sound_stamps(data))
+        super().static_callback(_before(_SECONDS, data))
 
 
-def _with_sound_stamps(data: Any) -> Any:
-    if all(transform.header.stamp.secs < _SECONDS for transform in data.transforms):
+def _before(latest: float, data: Any) -> Any:
+    """Return a message with those of its transforms whose stamps are before a time, s."""
+    kept = [transform for transform in data.transforms if transform.header.stamp.to_sec() < latest]
+    if len(kept) == len(data.transforms):
         return data
-    rospy.logwarn_throttle(10.0, "tf: a transform is ignored: its stamp fits no message")
-    kept = type(data)([transform for transform in data.transforms if transform.header.stamp.secs < _SECONDS])
-    kept._connection_header = data._connection_header
-    return kept
+    publisher = data._connection_header.get("callerid", "somebody")
+    rospy.logwarn_throttle(
+        10.0, f"tf: transforms of {publisher} are ignored: they are stamped {TF_CACHE:g} s or more ahead of the clock"
+    )
+    rest = type(data)(kept)
+    rest._connection_header = data._connection_header
+    return rest
