@@ -360,3 +360,7 @@ def test_bag_that_can_not_be_read_is_told():
 )
 def test_what_counts_as_this_computer(host, is_local):
     assert is_loopback(host) is is_local
+
+
+def test_token_is_in_no_text_of_who_may_do_what():
+    assert "hush" not in repr(Access("localhost", 0, "hush"))

@@ -1,4 +1,5 @@
 import socket
+import urllib.request
 
 import pytest
 from mros1_reasoner.io.ontology_files import read_knowledge_base, save_knowledge_base
@@ -121,10 +122,14 @@ def test_direction_comes_from_the_model_unless_set(load):
 
 
 def test_imports_are_read_from_the_models_folder_never_from_the_network(load, monkeypatch, caplog):
-    def no_network(*args, **kwargs):
-        raise AssertionError("the network was asked")
+    asked = []
 
-    monkeypatch.setattr(socket.socket, "connect", no_network)
+    def no_network(*words, **_):
+        asked.append(words)
+        raise OSError("there is no network")
+
+    for place, name in ((socket.socket, "connect"), (socket, "getaddrinfo"), (urllib.request, "urlopen")):
+        monkeypatch.setattr(place, name, no_network)
     text = application().replace(
         '<owl:Ontology rdf:about="http://example.org/app"/>',
         '<owl:Ontology rdf:about="http://example.org/app"><owl:imports rdf:resource="http://example.org/parts"/>'
@@ -135,6 +140,7 @@ def test_imports_are_read_from_the_models_folder_never_from_the_network(load, mo
     assert "wheel" in knowledge_base.components
     assert "http://example.org/unknown" in caplog.text
     assert "http://ros/mros>" not in caplog.text
+    assert asked == []
 
 
 def test_saved_knowledge_base_loads_again(load, pellet, tmp_path):

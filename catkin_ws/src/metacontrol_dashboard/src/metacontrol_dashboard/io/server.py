@@ -61,7 +61,7 @@ class Access:
 
     address: str = "localhost"
     port: int = 0
-    token: str = ""
+    token: str = field(default="", repr=False)
     control: bool = True
 
     @property

@@ -14,6 +14,7 @@ from geometry_msgs.msg import Pose as PoseMessage
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from node_kit.parameters import ParameterError, ParameterTree
 from node_kit.ros.lifetime import Lifetime
+from node_kit.ros.reconfigure_server import Strict
 from robot_formulas.geometry import Pose, quaternion_of
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Float32
@@ -31,6 +32,10 @@ _SHARE_OF = 10
 """Images over which the share of those with a tag is taken: 2 s at 5 Hz."""
 _LOOK_PERIOD = 0.2
 """s, wall, between two looks at whether the camera has the settings that it should have."""
+
+
+class _Server(Strict, Server):
+    """dynamic_reconfigure's, which refuses what it does not have."""
 
 
 class TagLocalizer:
@@ -57,7 +62,7 @@ class TagLocalizer:
         self._detection = rospy.Publisher("tag_detection", PoseStamped, queue_size=1)
         self._share = rospy.Publisher("tag_share", Float32, queue_size=1)
         self._markers = rospy.Publisher("tag_markers", MarkerArray, queue_size=1)
-        self._server = Server(TagLocalizerConfig, self._on_settings)
+        self._server = _Server(TagLocalizerConfig, self._on_settings)
         self._inputs = (
             rospy.Subscriber("camera/camera_info", CameraInfo, self._on_info, queue_size=1),
             rospy.Subscriber("camera/image_raw", Image, self._on_image, queue_size=1, buff_size=LARGE),

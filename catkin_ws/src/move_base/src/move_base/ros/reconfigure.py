@@ -8,6 +8,7 @@ from typing import Any
 
 import rospy
 from dynamic_reconfigure.server import Server
+from node_kit.ros.reconfigure_server import Strict
 
 from move_base.parameters.reconfiguration import ServerDescription, as_default
 
@@ -29,7 +30,7 @@ def offer(descriptions: Sequence[ServerDescription], present: Present, take: Tak
     return [_Server(description, present, take) for description in descriptions]
 
 
-class _Server(Server):
+class _Server(Strict, Server):
     """A server that starts with the node's values, and writes only changed values to the parameter server.
 
     The base class reads and writes each parameter in a call of its own, which takes a second for six servers.

@@ -27,6 +27,7 @@ from ros_model.language.any_language import PACKAGES
 from rosgraph_launcher.io.master import NodeApi
 from rosgraph_launcher.io.ownership import is_this_host, look_up
 from rosgraph_launcher.io.this_host import resolved as addresses_of
+from rosgraph_manipulator.configuration.configurations import ConfigurationError, action_type
 from rosgraph_monitor.graph.comparison import Scope
 from rosgraph_monitor.graph.defaults import parameter_defaults
 from rosgraph_monitor.graph.names import instance, resolved
@@ -160,14 +161,19 @@ def _initial(folder: Path) -> Iterator[tuple[str, str]]:
 
 
 def _missing_types(project: Project) -> dict[str, str]:
-    """Return the types of goals that can't be imported, with the reason."""
+    """Return the types of goals that can't be imported, with the reason; only messages of ROS packages are imported."""
     entries = [*project.settings["functions"].values(), project.settings.get("manipulator", {})]
     found = {}
     for name in {str(entry["goal_msg_type"]) for entry in entries if "goal_msg_type" in entry}:
-        module, _, kind = name.rpartition(".")
         try:
-            getattr(importlib.import_module(module), kind)
-        except (ImportError, AttributeError, ValueError) as error:
+            package, _, kind = action_type(name, "goal_msg_type").partition("/")
+            rospkg.RosPack().get_path(package)
+            getattr(importlib.import_module(f"{package}.msg"), kind)
+        except ConfigurationError:
+            found[name] = "names no action's type, such as move_base_msgs.msg.MoveBaseAction"
+        except rospkg.ResourceNotFound:
+            found[name] = f"can't be imported (no package {package})"
+        except (ImportError, AttributeError) as error:
             found[name] = f"can't be imported ({error})"
     return found
 

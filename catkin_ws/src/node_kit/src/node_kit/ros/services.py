@@ -25,7 +25,8 @@ def call(service: str, kind: type, /, *arguments: Any, **fields: Any) -> Any:
 
     Raises:
         ROSException: it is not there, or does not answer, in time.
-        ServiceException, OSError: the call has failed.
+        ServiceException: the call has failed.
+        NoThreadError: the system refuses a thread.
     """
     return call_within(FIND_S, service, kind, *arguments, **fields)
 
@@ -40,8 +41,8 @@ def call_within(find_s: float, service: str, kind: type, /, *arguments: Any, **f
 
 
 def _call(find_s: float, name: str, kind: type, /, *arguments: Any, **fields: Any) -> Any:
-    rospy.wait_for_service(name, find_s)
     try:
+        rospy.wait_for_service(name, find_s)
         return rospy.ServiceProxy(name, kind)(*arguments, **fields)
-    except TransportException as error:
+    except (TransportException, OSError) as error:  # they do not say of whom
         raise rospy.ServiceException(f"{name}: {error}") from error

@@ -7,6 +7,7 @@ import rospy
 from dynamic_reconfigure.server import Server
 from node_kit.parameters import ParameterError, ParameterTree
 from node_kit.ros.lifetime import Lifetime
+from node_kit.ros.reconfigure_server import Strict
 from sensor_msgs.msg import CameraInfo, Image
 
 from pybullet_simulator.cfg import ColourCameraConfig
@@ -19,6 +20,10 @@ from pybullet_simulator.ros.device import DeviceError, check_device
 
 _LARGE = 1 << 23
 """Bytes; rospy's default buffer would read an image in many parts."""
+
+
+class _Server(Strict, Server):
+    """dynamic_reconfigure's, which refuses what it does not have."""
 
 
 class ColourCameraNode:
@@ -38,7 +43,7 @@ class ColourCameraNode:
         self._image = rospy.Publisher("camera/image_raw", Image, queue_size=1, tcp_nodelay=True)
         self._info = rospy.Publisher("camera/camera_info", CameraInfo, queue_size=1)
         self._depth = rospy.Publisher("camera/depth/image_raw", Image, queue_size=1, tcp_nodelay=True)
-        self._server = Server(ColourCameraConfig, self._on_settings)
+        self._server = _Server(ColourCameraConfig, self._on_settings)
         self._inputs = (
             rospy.Subscriber("simulator/image", Image, self._on_light, queue_size=1, buff_size=_LARGE),
             rospy.Subscriber("simulator/depth", Image, self._on_depth, queue_size=1, buff_size=_LARGE),

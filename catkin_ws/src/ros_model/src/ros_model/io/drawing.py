@@ -6,6 +6,8 @@ import subprocess
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from node_kit.io.output_files import write_file
+
 from ros_model.errors import ModelError
 from ros_model.language.metamodel import CONNECTION_OF, ENDS, ConnectionKind
 
@@ -55,7 +57,7 @@ def draw(text: str, path: Path) -> None:
     if form not in FORMATS:
         raise ModelError(f"{path}: graphs are drawn as {', '.join(f'.{known}' for known in FORMATS)}: give such a name")
     try:
-        path.write_bytes(text.encode() if form == "dot" else _rendered(text, form))
+        write_file(path, text if form == "dot" else _rendered(text, form))
     except OSError as error:
         raise ModelError(f"{path}: {error.strerror or error}: check the path") from error
 

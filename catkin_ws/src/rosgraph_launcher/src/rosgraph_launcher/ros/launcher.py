@@ -35,7 +35,7 @@ from rosgraph_launcher.io.ownership import launcher_mark
 from rosgraph_launcher.io.processes import StartError, check_host
 from rosgraph_launcher.io.secret import SecretError, check_signature, read_secret
 from rosgraph_launcher.io.this_host import addresses
-from rosgraph_launcher.io.usage import read_sample
+from rosgraph_launcher.io.usage import read_samples
 from rosgraph_launcher.launching.options import LONGEST_TIMEOUT, LauncherOptions
 from rosgraph_launcher.launching.report import ENDING, LauncherReport
 from rosgraph_launcher.launching.restarts import RestartPolicy
@@ -123,8 +123,7 @@ class LauncherNode:
         return CheckNodesResponse(up=up, conflicts=conflicts)
 
     def _on_usage(self, request: ReadUsageRequest) -> ReadUsageResponse:
-        read = {pid: read_sample(pid, pid not in request.alone) for pid in request.pids}
-        return ReadUsageResponse(usage_messages({pid: sample for pid, sample in read.items() if sample}))
+        return ReadUsageResponse(usage_messages(read_samples(request.pids, request.alone)))
 
     def _on_stand_by(self, request: StandByRequest) -> StandByResponse:
         try:

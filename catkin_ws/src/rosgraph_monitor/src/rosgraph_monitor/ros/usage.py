@@ -15,7 +15,7 @@ from node_kit.io.background import in_background
 from node_kit.ros.services import SERVICE_FAILURES
 from rosgraph_launcher.io.ownership import is_this_host
 from rosgraph_launcher.io.this_host import resolved as addresses_of
-from rosgraph_launcher.io.usage import read_sample
+from rosgraph_launcher.io.usage import read_samples
 from rosgraph_launcher.ros.node_messages import samples_from
 
 from rosgraph_monitor.graph.names import resolved
@@ -88,11 +88,8 @@ class UsageWatch:
         # The children of a launcher are nodes of their own.
         alone = {rospy.resolve_name(_MAIN_LAUNCHER), *(launcher.name for launcher in launchers)}
         told = self._ask({teller: nodes for teller, nodes in wanted.items() if teller != THIS_HOST}, alone)
-        told[THIS_HOST] = {
-            pid: sample
-            for node, pid in wanted.get(THIS_HOST, {}).items()
-            if (sample := read_sample(pid, node not in alone))
-        }
+        mine = wanted.get(THIS_HOST, {})
+        told[THIS_HOST] = read_samples(mine.values(), {pid for node, pid in mine.items() if node in alone})
         return {
             (self._names[node], teller): told[teller][pid]
             for teller, nodes in wanted.items()
