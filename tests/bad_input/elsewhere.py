@@ -1,4 +1,4 @@
-"""What opens files or listens to topics, and is not tried by itself: for each module, why."""
+"""What opens files, listens to topics or answers requests, and is not tried by itself: for each module, why."""
 
 from __future__ import annotations
 
@@ -77,7 +77,6 @@ FILES: dict[str, str] = {
 """Modules that open or parse something."""
 
 TOPICS: dict[str, str] = {
-    "metacontrol_experiments/ros/fault_injection.py": _CLIENT,
     "metacontrol_experiments/ros/manager.py": "reads diagnostics and configurations as the reasoner does",
     "metacontrol_experiments/ros/recorded_reports.py": "passes messages on",
     "metacontrol_manipulation/ros/approach.py": _CLIENT,
@@ -87,15 +86,13 @@ TOPICS: dict[str, str] = {
     "metacontrol_sim/ros/send_goal.py": "only waits for a message",
     "mros1_reasoner/ros/arrivals.py": "only notes when a message came",
     "mros1_reasoner/ros/asking.py": _CLIENT,
-    "mros1_reasoner/ros/decisions.py": _ONE,
     "mros1_reasoner/ros/repairs.py": _CLIENT,
     "mros1_reasoner/ros/requests.py": _CLIENT,
     "node_kit/ros/parts.py": "its conversion is tried with the monitor's views",
     "pybullet_simulator/ros/window.py": "draws in a window of the demonstrator",
-    "rosgraph_manipulator/ros/action_server.py": _CLIENT,
     "rosgraph_manipulator/ros/client.py": _ONE,
-    "rosgraph_manipulator/ros/relay.py": _CLIENT,
-    "rosgraph_manipulator/ros/repairs.py": _CLIENT,
-    "rosgraph_manipulator/ros/requests.py": _CLIENT,
 }
 """Modules that listen to topics."""
+
+SERVICES: dict[str, str] = {}
+"""Modules that answer requests."""

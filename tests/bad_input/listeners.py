@@ -6,6 +6,7 @@ import contextlib
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
@@ -119,20 +120,24 @@ def packed(listener: Listener, messages: Sequence[tuple[str, Any]]) -> bytes:
     return pack([(topics.index(topic), serialised(message)) for topic, message in messages])
 
 
-@cache
-def _good(name: str) -> list[tuple[str, Any]]:
-    clock = (_CLOCK, Clock(rospy.Time.from_sec(NOW + 1.0)))
-    return [*next(one for one in LISTENERS if one.name == name).seeds(), clock]
+_GOOD: dict[str, list[tuple[str, Any]]] = {}
+
+
+def _good(listener: Listener) -> list[tuple[str, Any]]:
+    """Return a listener's good messages, and one that sets the clock."""
+    if listener.name not in _GOOD:
+        _GOOD[listener.name] = [*listener.seeds(), (_CLOCK, Clock(rospy.Time.from_sec(NOW + 1.0)))]
+    return _GOOD[listener.name]
 
 
 def topics_of(listener: Listener) -> list[str]:
     """Return the topics of a listener's messages, and that of the clock; each has its number."""
-    return list(dict.fromkeys(topic for topic, _ in _good(listener.name)))
+    return list(dict.fromkeys(topic for topic, _ in _good(listener)))
 
 
 def mutated_messages(rng: Random, listener: Listener, seeds: Sequence[bytes]) -> bytes:
     """Return messages, at least one of which is bad."""
-    topics, kinds = topics_of(listener), {topic: type(message) for topic, message in _good(listener.name)}
+    topics, kinds = topics_of(listener), {topic: type(message) for topic, message in _good(listener)}
     parts = [(topic % len(topics), data) for topic, data in unpack(rng.choice(seeds))] or [(0, b"")]
     if rng.random() < _OTHER:
         rng.shuffle(parts)
@@ -193,21 +198,21 @@ def _set_clock(data: bytes) -> None:
 STAMP = rospy.Time.from_sec(NOW - 0.1)
 
 
-def _stamped(message: Any, frame: str = "") -> Any:
+def stamped(message: Any, frame: str = "") -> Any:
     message.header.stamp, message.header.frame_id = STAMP, frame
     return message
 
 
-def _configuration(function: str = "f_talk", name: str = "fast") -> ActiveConfiguration:
-    return _stamped(ActiveConfiguration(functions=[FunctionGrounding(function, name, "STABLE")]))
+def configuration(function: str = "f_talk", name: str = "fast") -> ActiveConfiguration:
+    return stamped(ActiveConfiguration(functions=[FunctionGrounding(function, name, "STABLE")]))
 
 
 def _status(message: str, key: str, value: str, level: int = 0, name: str = "/talker", more: str = "") -> Any:
     values = [KeyValue(key, value)] + ([KeyValue("reason", more)] if more else [])
-    return _stamped(DiagnosticArray(status=[DiagnosticStatus(level, name, message, "robot", values)]))
+    return stamped(DiagnosticArray(status=[DiagnosticStatus(level, name, message, "robot", values)]))
 
 
-def _diagnostics() -> list[tuple[str, Any]]:
+def diagnostics() -> list[tuple[str, Any]]:
     return [
         ("/diagnostics", _status("QA status", "freshness", "0.1")),
         ("/diagnostics", _status("QA status", "power", "1.5")),
@@ -222,30 +227,30 @@ def _diagnostics() -> list[tuple[str, Any]]:
 
 
 def _goals(status: int = 1) -> GoalStatusArray:
-    return _stamped(GoalStatusArray(status_list=[GoalStatus(GoalID(STAMP, "a-1"), status, "text")]))
+    return stamped(GoalStatusArray(status_list=[GoalStatus(GoalID(STAMP, "a-1"), status, "text")]))
 
 
-def _goal() -> MoveBaseActionGoal:
-    goal = _stamped(MoveBaseActionGoal(goal_id=GoalID(STAMP, "a-1")))
-    goal.goal.target_pose = _pose("map")
+def goal() -> MoveBaseActionGoal:
+    goal = stamped(MoveBaseActionGoal(goal_id=GoalID(STAMP, "a-1")))
+    goal.goal.target_pose = pose("map")
     return goal
 
 
-def _pose(frame: str = "odom") -> PoseStamped:
-    pose = _stamped(PoseStamped(), frame)
+def pose(frame: str = "odom") -> PoseStamped:
+    pose = stamped(PoseStamped(), frame)
     pose.pose.position.x, pose.pose.orientation.w = 1.0, 1.0
     return pose
 
 
 def _placed(frame: str = "map") -> PoseWithCovarianceStamped:
-    pose = _stamped(PoseWithCovarianceStamped(), frame)
+    pose = stamped(PoseWithCovarianceStamped(), frame)
     pose.pose.pose.orientation.w = 1.0
     pose.pose.covariance = [0.01] * 36
     return pose
 
 
 def _odometry() -> Odometry:
-    odometry = _stamped(Odometry(child_frame_id="base_link"), "odom")
+    odometry = stamped(Odometry(child_frame_id="base_link"), "odom")
     odometry.pose.pose.orientation.w, odometry.twist.twist.linear.x = 1.0, 0.3
     return odometry
 
@@ -255,11 +260,11 @@ def _scan(frame: str = "front_laser") -> LaserScan:
         angle_min=-1.5, angle_max=1.5, angle_increment=0.1, range_min=0.1, range_max=10.0, scan_time=0.1,
         ranges=[1.0 + n * 0.1 for n in range(31)],
     )  # fmt: skip
-    return _stamped(scan, frame)
+    return stamped(scan, frame)
 
 
 def _grid(width: int = 12, height: int = 9) -> OccupancyGrid:
-    grid = _stamped(OccupancyGrid(data=[0] * (width * height)), "map")
+    grid = stamped(OccupancyGrid(data=[0] * (width * height)), "map")
     grid.info.width, grid.info.height, grid.info.resolution = width, height, 0.5
     grid.info.origin.position.x = grid.info.origin.position.y = -2.0
     grid.info.origin.orientation.w = 1.0
@@ -269,7 +274,7 @@ def _grid(width: int = 12, height: int = 9) -> OccupancyGrid:
 def _cloud() -> PointCloud2:
     fields = [PointField(name, 4 * n, PointField.FLOAT32, 1) for n, name in enumerate("xyz")]
     data = np.arange(30, dtype=np.float32).tobytes()
-    return _stamped(
+    return stamped(
         PointCloud2(height=1, width=10, fields=fields, point_step=12, row_step=120, data=data, is_dense=True),
         "camera_link",
     )
@@ -279,11 +284,11 @@ def _image(encoding: str, width: int = 16, height: int = 12, size: int = 1) -> I
     data = np.linspace(0, 200, width * height * size).astype(np.uint8).tobytes()
     if encoding.startswith("32F"):
         data = np.linspace(0.2, 5.0, width * height * size // 4).astype(np.float32).tobytes()
-    return _stamped(Image(height=height, width=width, encoding=encoding, step=width * size, data=data), "camera_link")
+    return stamped(Image(height=height, width=width, encoding=encoding, step=width * size, data=data), "camera_link")
 
 
 def _info() -> CameraInfo:
-    return _stamped(
+    return stamped(
         CameraInfo(height=12, width=16, distortion_model="plumb_bob", D=[0.0] * 5,
                    K=[20.0, 0, 8.0, 0, 20.0, 6.0, 0, 0, 1.0], R=[1.0, 0, 0, 0, 1.0, 0, 0, 0, 1.0],
                    P=[20.0, 0, 8.0, 0, 0, 20.0, 6.0, 0, 0, 0, 1.0, 0])
@@ -291,7 +296,7 @@ def _info() -> CameraInfo:
 
 
 def _transform(parent: str, child: str) -> TransformStamped:
-    transform = _stamped(TransformStamped(child_frame_id=child), parent)
+    transform = stamped(TransformStamped(child_frame_id=child), parent)
     transform.transform.rotation.w = 1.0
     return transform
 
@@ -301,16 +306,16 @@ def _tree() -> list[tuple[str, Any]]:
     return [("/tf", TFMessage([_transform(*pair) for pair in pairs]))]
 
 
-def _decision() -> Decision:
+def decision() -> Decision:
     expected = [ExpectedQA(name="freshness", value=0.1)]
-    found = _stamped(Decision(id="d-1", state="DECIDED", objective="o_talk", trigger="qa:freshness", causes=["late"]))
+    found = stamped(Decision(id="d-1", state="DECIDED", objective="o_talk", trigger="qa:freshness", causes=["late"]))
     found.candidates = [Candidate(name="fast", expected_qas=expected, utility=0.5, chosen=True)]
     found.reasons, found.to_configuration, found.stamp_monitored = [Cause()], "fast", STAMP
     return found
 
 
 def _event() -> MissionEvent:
-    return _stamped(MissionEvent(kind="PERTURBATION", name="clutter:7", values=[KeyValue("places", "1.0,2.0")]))
+    return stamped(MissionEvent(kind="PERTURBATION", name="clutter:7", values=[KeyValue("places", "1.0,2.0")]))
 
 
 def _sign() -> DiagnosticStatus:
@@ -319,12 +324,12 @@ def _sign() -> DiagnosticStatus:
 
 
 def _result() -> MoveBaseActionResult:
-    return _stamped(MoveBaseActionResult(status=GoalStatus(GoalID(STAMP, "a-1"), 3, "reached")))
+    return stamped(MoveBaseActionResult(status=GoalStatus(GoalID(STAMP, "a-1"), 3, "reached")))
 
 
 def _journals() -> list[tuple[str, ReasonerJournal]]:
     topic = "/mros1_reasoner/journal"
-    return [(topic, _stamped(journal())), (topic, _stamped(journal(len(ENTRIES), begins=False)))]
+    return [(topic, stamped(journal())), (topic, stamped(journal(len(ENTRIES), begins=False)))]
 
 
 def _arm_state() -> ArmState:
@@ -334,6 +339,10 @@ def _arm_state() -> ArmState:
 # -- who listens -------------------------------------------------------------------------------------------------------
 
 
+_SAVED = TemporaryDirectory()
+"""Where reasoners save what they know."""
+
+
 @cache
 def _reasoning() -> Any:
     from mros1_reasoner.io.parameters import Parameters
@@ -341,14 +350,14 @@ def _reasoning() -> Any:
 
     from bad_input.journals import PARAMETERS
 
-    parameters = Parameters({**PARAMETERS, "task_actions": {"o_talkA": "talk"}})
+    parameters = Parameters({**PARAMETERS, "task_actions": {"o_talkA": "talk"}, "save_folder": _SAVED.name})
     knowledge = parameters.knowledge_base()
     reasoner = make_reasoner("rules")
     reasoner.load(knowledge.ontology)
     return parameters, knowledge, parameters.objectives(knowledge), reasoner
 
 
-def _reasoner(_ros: Ros) -> Callable[[], object]:
+def reasoner(_ros: Ros) -> Callable[[], object]:
     from mros1_reasoner.loop.entries import Step
     from mros1_reasoner.ros.reasoner import ReasonerNode
 
@@ -364,16 +373,6 @@ def _reasoner(_ros: Ros) -> Callable[[], object]:
             node._next_look()
 
     return settle
-
-
-def _objective() -> Any:
-    from metacontrol_msgs.msg import PursueObjectiveActionGoal
-
-    goal = _stamped(PursueObjectiveActionGoal(goal_id=GoalID(STAMP, "o-1")))
-    for name, value in (("objective", "o_talkA"), ("function", "f_talk")):
-        if hasattr(goal.goal, name):
-            setattr(goal.goal, name, value)
-    return goal
 
 
 def _monitor(_ros: Ros) -> Callable[[], object]:
@@ -552,6 +551,11 @@ _MOVE_BASE: dict[str, Any] = {
 
 
 def _move_base(_ros: Ros) -> Callable[[], object]:
+    return made_move_base()[1]
+
+
+def made_move_base() -> tuple[Any, Callable[[], object]]:
+    """Return a node, and what has it work on what it has heard."""
     from move_base.parameters.reader import read_parameters
     from move_base.ros.move_base import MoveBaseNode
 
@@ -567,13 +571,13 @@ def _move_base(_ros: Ros) -> Callable[[], object]:
             node._tick(rospy.get_time())
             rospy.rostime._set_rostime(rospy.get_rostime() + rospy.Duration(0, 200_000_000))
 
-    return settle
+    return node, settle
 
 
-def _move_base_good() -> list[tuple[str, Any]]:
-    update = _stamped(OccupancyGridUpdate(x=1, y=1, width=3, height=2, data=[0] * 6), "map")
+def move_base_good() -> list[tuple[str, Any]]:
+    update = stamped(OccupancyGridUpdate(x=1, y=1, width=3, height=2, data=[0] * 6), "map")
     points = [Point32(1.0, 0.5 * n, 0.3) for n in range(5)]
-    cloud = _stamped(PointCloud(points=points, channels=[ChannelFloat32("i", [1.0] * 5)]), "camera_link")
+    cloud = stamped(PointCloud(points=points, channels=[ChannelFloat32("i", [1.0] * 5)]), "camera_link")
     corners = [Point32(x, y, 0.0) for x, y in ((0.3, 0.3), (-0.3, 0.3), (-0.3, -0.3), (0.3, -0.3))]
     return [
         *_tree(),
@@ -585,8 +589,8 @@ def _move_base_good() -> list[tuple[str, Any]]:
         ("/points", cloud),
         ("/node/global_costmap/footprint", Polygon(corners)),
         ("/move_base/cancel", GoalID(rospy.Time(), "other")),
-        ("/move_base/goal", _goal()),
-        ("/move_base_simple/goal", _pose("map")),
+        ("/move_base/goal", goal()),
+        ("/move_base_simple/goal", pose("map")),
     ]
 
 
@@ -619,7 +623,7 @@ def _arm(_ros: Ros) -> None:
 
 
 def _arm_good() -> list[tuple[str, Any]]:
-    motion = _stamped(FollowJointTrajectoryActionGoal(goal_id=GoalID(STAMP, "m-1")))
+    motion = stamped(FollowJointTrajectoryActionGoal(goal_id=GoalID(STAMP, "m-1")))
     from pybullet_simulator.messages.arms import joint_names
 
     motion.goal.trajectory.joint_names = joint_names("left")
@@ -628,7 +632,7 @@ def _arm_good() -> list[tuple[str, Any]]:
         JointTrajectoryPoint(positions=p, velocities=[0.0] * 7, time_from_start=rospy.Duration(t))
         for t, p in ((0, _arm_state().positions), (2, later))
     ]
-    grip = _stamped(GripperCommandActionGoal(goal_id=GoalID(STAMP, "g-1")))
+    grip = stamped(GripperCommandActionGoal(goal_id=GoalID(STAMP, "g-1")))
     grip.goal.command.position, grip.goal.command.max_effort = 0.02, 10.0
     state, after = "/simulator/left_arm/state", _arm_state()
     after.stamp = STAMP + rospy.Duration(1)
@@ -649,6 +653,11 @@ def _simulations() -> Any:
 
 
 def _simulator(_ros: Ros) -> Callable[[], object]:
+    return made_simulators()[2]
+
+
+def made_simulators() -> tuple[Any, Any, Callable[[], object]]:
+    """Return the simulators of D2 and D1, and what has both take a step."""
     from node_kit.io.inbox import Inbox
     from pybullet_simulator.ros.cell_simulator import CellSimulatorNode
     from pybullet_simulator.ros.simulator import SimulatorNode
@@ -667,7 +676,7 @@ def _simulator(_ros: Ros) -> Callable[[], object]:
             node._inbox.drain()
             node._simulation.step()
 
-    return settle
+    return robot, cell, settle
 
 
 def _dashboard(_ros: Ros) -> Callable[[], object]:
@@ -703,16 +712,16 @@ def _dashboard(_ros: Ros) -> Callable[[], object]:
 
 def _dashboard_good() -> list[tuple[str, Any]]:
     return [
-        *_diagnostics(),
+        *diagnostics(),
         ("/metacontrol_parts", _sign()),
-        ("/rosgraph_manipulator/active_configuration", _configuration()),
-        ("/mros1_reasoner/decision", _decision()),
+        ("/rosgraph_manipulator/active_configuration", configuration()),
+        ("/mros1_reasoner/decision", decision()),
         ("/mission/event", _event()),
         ("/place/map", _grid()),
         ("/place/costmap", _grid(3, 4)),
         ("/place/pose", _odometry()),
-        ("/place/way", _stamped(PathMessage(poses=[_pose("map")] * 3), "map")),
-        ("/place/goal", _goal()),
+        ("/place/way", stamped(PathMessage(poses=[pose("map")] * 3), "map")),
+        ("/place/goal", goal()),
     ]
 
 
@@ -758,7 +767,7 @@ def _cell_good() -> list[tuple[str, Any]]:
     from pybullet_simulator.messages.arms import joint_names
 
     names = [*joint_names("left"), "left_panda_finger_joint1", "left_panda_finger_joint2"]
-    joints = _stamped(JointState(name=names, position=[0.1] * len(names)))
+    joints = stamped(JointState(name=names, position=[0.1] * len(names)))
     later = _odometry()
     later.header.stamp = STAMP + rospy.Duration(0, 50_000_000)
     return [
@@ -800,9 +809,9 @@ def _mission(_ros: Ros) -> Callable[[], object]:
 
 def _mission_good() -> list[tuple[str, Any]]:
     return [
-        ("/rosgraph_manipulator/active_configuration", _configuration()),
-        ("/mros1_reasoner/decision", _decision()),
-        *_diagnostics(),
+        ("/rosgraph_manipulator/active_configuration", configuration()),
+        ("/mros1_reasoner/decision", decision()),
+        *diagnostics(),
         ("/amcl_pose", _placed()),
         ("/move_base/status", _goals()),
         ("/move_base/result", _result()),
@@ -832,39 +841,39 @@ def _pyramid(_ros: Ros) -> None:
 
 LISTENERS: tuple[Listener, ...] = (
     Listener(
-        "the reasoner", ("mros1_reasoner/ros/reasoner.py", "mros1_reasoner/ros/objectives.py"), _reasoner,
-        lambda: [("/rosgraph_manipulator/active_configuration", _configuration()), *_diagnostics(),
+        "the reasoner", ("mros1_reasoner/ros/reasoner.py",), reasoner,
+        lambda: [("/rosgraph_manipulator/active_configuration", configuration()), *diagnostics(),
                  ("/obj_error", Bool(True)), ("/talk/status", _goals(4))],
         share=0.5,
     ),
     Listener(
         "the monitor", ("rosgraph_monitor/ros/monitor.py", "rosgraph_monitor/ros/topics.py",
                         "rosgraph_monitor/ros/driver_status.py"), _monitor,
-        lambda: [("/battery_state", _stamped(BatteryState(percentage=0.5, charge=1.0, capacity=2.0))),
+        lambda: [("/battery_state", stamped(BatteryState(percentage=0.5, charge=1.0, capacity=2.0))),
                  ("/odom", _odometry()), ("/diagnostics", _status("x", "force", "3", 2, "arm: safety")),
-                 ("/rosgraph_manipulator/active_configuration", _configuration())],
+                 ("/rosgraph_manipulator/active_configuration", configuration())],
         types={"/odom": "nav_msgs/Odometry"}, share=0.5,
     ),
     Listener(
         "the observers", ("rosgraph_monitor/ros/observers.py",), _observers,
         lambda: [("/odometry/filtered", _odometry()), ("/tf_static", _tree()[0][1]), ("/front/scan", _scan()),
                  ("/camera/depth/points", _cloud()), ("/power_load", Float32(3.0)),
-                 ("/illuminance", _stamped(Illuminance(illuminance=200.0))), ("/amcl_pose", _placed()),
+                 ("/illuminance", stamped(Illuminance(illuminance=200.0))), ("/amcl_pose", _placed()),
                  ("/move_base/status", _goals(4))],
         share=2.0,
     ),
     Listener(
         "the monitor's views", ("rosgraph_monitor/ros/watch.py", "rosgraph_monitor/ros/diagnostic_names.py"), _watch,
-        lambda: [*_diagnostics(), ("/metacontrol_parts", _sign()),
-                 ("/rosgraph_manipulator/active_configuration", _configuration())], share=0.5,
+        lambda: [*diagnostics(), ("/metacontrol_parts", _sign()),
+                 ("/rosgraph_manipulator/active_configuration", configuration())], share=0.5,
     ),
     Listener(
         "the text for RViz", ("rosgraph_monitor/ros/rviz_text.py",), _rviz_text,
-        lambda: [*_diagnostics(), ("/rosgraph_manipulator/active_configuration", _configuration())],
+        lambda: [*diagnostics(), ("/rosgraph_manipulator/active_configuration", configuration())],
     ),
     Listener(
         "the keeper of goals", ("rosgraph_manipulator/ros/goal.py",), _pending_goal,
-        lambda: [("/move_base/goal", _goal()), ("/move_base/status", _goals()), ("/move_base/result", _result()),
+        lambda: [("/move_base/goal", goal()), ("/move_base/status", _goals()), ("/move_base/result", _result()),
                  ("/move_base/cancel", GoalID(STAMP, "a-1"))],
     ),
     Listener(
@@ -880,11 +889,11 @@ LISTENERS: tuple[Listener, ...] = (
         "descriptions of parameters", ("rosgraph_manipulator/ros/reconfigure_client.py",), _reconfigure,
         lambda: [("/parameter_descriptions", _description())],
     ),
-    Listener("move_base", ("move_base/ros/move_base.py", "move_base/ros/goals.py"), _move_base, _move_base_good,
+    Listener("move_base", ("move_base/ros/move_base.py", "move_base/ros/goals.py"), _move_base, move_base_good,
              share=1.0),
     Listener(
         "the battery's load", ("metacontrol_sim/ros/battery_load_control.py",), _load_control,
-        lambda: [("/odom", _odometry()), ("/imu/data", _stamped(Imu())), ("/cmd_vel", Twist())],
+        lambda: [("/odom", _odometry()), ("/imu/data", stamped(Imu())), ("/cmd_vel", Twist())],
     ),
     Listener(
         "drivers of sensors", ("pybullet_simulator/ros/laser.py", "pybullet_simulator/ros/camera.py",
@@ -911,7 +920,7 @@ LISTENERS: tuple[Listener, ...] = (
              _mission, _mission_good),
     Listener(
         "contingencies on the way", ("metacontrol_experiments/ros/contingencies.py",), _contingencies,
-        lambda: [("/amcl_pose", _placed()), ("/move_base/goal", _goal())],
+        lambda: [("/amcl_pose", _placed()), ("/move_base/goal", goal())],
         share=0.5,
     ),
     Listener(

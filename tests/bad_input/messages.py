@@ -71,6 +71,8 @@ def changed(rng: Random, data: bytes, kind: Any, others: Sequence[bytes]) -> byt
         message.deserialize(data)
     except (genpy.DeserializationError, UnicodeDecodeError):
         return mutated(rng, [data], "binary")
+    if not message.__slots__:  # the request of a trigger
+        return mutated(rng, [data, *others], "binary")
     last = data  # where nothing can be changed: what is read from it may not fit into a message, such as a late stamp
     for _ in range(rng.choice((1, 1, 1, 2, 3, 6))):
         holder, slot, type_name = rng.choice(list(_fields(message)))

@@ -12,9 +12,11 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from unittest.mock import patch
+from xml.parsers.expat import ExpatError
 
 import cv2
 import numpy as np
+import yaml
 from helpers.campaign_tables import result
 from helpers.mission_bags import adapting_mission
 from metacontrol_bags.adaptation import describe_adaptation
@@ -72,6 +74,7 @@ from ros_model.io.project import library_beside, load_project, read_table
 from ros_model.language.reconfigure import ReconfigureError, parse_reconfigure
 from ros_model_extraction.io.launch_files import read_launch_file
 from ros_model_extraction.packages.package_source import extract_package
+from rosgraph_manipulator.change.journal import Journal, begin_journal, parse_journal, resume
 from rosgraph_manipulator.configuration.configurations import ConfigurationError
 from rosgraph_manipulator.io.configuration_file import options_from, read_file
 from rosgraph_manipulator.io.launch_files import LaunchFileError, read_model
@@ -313,6 +316,32 @@ def _knowledge() -> Any:
 
 def _manipulator_settings(path: Path) -> object:
     return options_from(read_file(str(path)))
+
+
+def _kept_journal() -> list[bytes]:
+    failures = {"f_talk": "dead"}
+    kept = Journal({"f_talk": "frugal"}, "fast", 99.5, attempts=1, failures=failures, supervisor="roslaunch 7")
+    return [yaml.safe_dump(kept.as_parameter()).encode()]
+
+
+def _kept_by_manipulator(path: Path) -> object:
+    """Begin by a journal that a manipulator finds on the parameter server, and keep the next one there."""
+    from bad_input.unconnected import told_by_master
+
+    try:
+        journal = parse_journal(told_by_master(read_yaml(path)))
+    except (TypeError, OverflowError, ExpatError, UnicodeError) as error:
+        raise InputFileError(path, f"no parameter: {type(error).__name__}") from error
+    known = {"fast": "f_talk", "frugal": "f_talk"}
+    begun = [
+        resume(journal, known, "f_talk", launched, failed, initial, 100.0, "roslaunch 7")
+        for launched in ("", "fast")
+        for failed in (False, True)
+        for initial in ("", "frugal")
+    ]
+    begun_journals = [begin_journal([one], "roslaunch 7") for one in begun]
+    noted = [one.noted(journal.configurations, 101.0, "fast", failures=journal.failures) for one in begun_journals]
+    return dict(journal.failures), [told_by_master(one.as_parameter()) for one in (*begun_journals, *noted)]
 
 
 def _move_base_settings(path: Path) -> object:
@@ -638,6 +667,10 @@ READERS: tuple[Reader, ...] = (
     Reader(
         "settings of the manipulator", ("rosgraph_manipulator/io/configuration_file.py",), "yaml", "bad.yaml",
         _texts(_MANIPULATOR), (ConfigurationError,), _manipulator_settings, 0.1, names_file=False,
+    ),
+    Reader(
+        "a manipulator's journal", ("rosgraph_manipulator/change/journal.py",), "yaml", "bad.yaml",
+        _kept_journal, (InputFileError,), _kept_by_manipulator, 0.2,
     ),
     Reader(
         "settings of the monitor", ("rosgraph_monitor/io/models.py",), "yaml", "bad.yaml",

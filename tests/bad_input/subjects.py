@@ -1,4 +1,4 @@
-"""Who takes inputs: readers of files, and listeners to topics."""
+"""Who takes inputs: readers of files, listeners to topics, and servers of requests."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 from bad_input.listeners import LISTENERS, Listener, mutated_messages, packed, take
 from bad_input.mutation import mutated
 from bad_input.readers import READERS, Reader
+from bad_input.servers import SERVERS
 
 if TYPE_CHECKING:
     from random import Random
@@ -103,7 +104,7 @@ class ListenerSubject:
 @cache
 def subjects() -> tuple[Subject, ...]:
     """Return all subjects."""
-    return (*map(ReaderSubject, READERS), *map(ListenerSubject, LISTENERS))
+    return (*map(ReaderSubject, READERS), *map(ListenerSubject, (*LISTENERS, *SERVERS)))
 
 
 def subject_of(name: str) -> Subject:

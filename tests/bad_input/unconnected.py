@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import io
 import threading
-from collections.abc import Iterator, Mapping
+import xmlrpc.client
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from typing import Any
 from unittest.mock import patch
@@ -12,7 +13,10 @@ from unittest.mock import patch
 import actionlib
 import genpy
 import rospy
+from node_kit.io.inbox import Inbox
+from node_kit.ros.kept_parameter import KeptParameter
 from rospy.exceptions import ROSSerializationException
+from rospy.impl.tcpros_service import convert_return_to_response
 
 NAME = "/node"
 NOW = 100.0
@@ -95,14 +99,29 @@ class Publisher:
         """Publish no more."""
 
 
-class Service:
-    """What a node offers: nobody calls it."""
+class Service(Subscriber):
+    """What a node offers: it listens to requests under the service's name."""
 
     def __init__(self, name: str, service_class: Any, handler: Any, *_: object, **__: object) -> None:
-        self.resolved_name, self.service_class, self.handler = rospy.resolve_name(name), service_class, handler
+        super().__init__(name, service_class._request_class, handler)
+        self.service_class, self.handler = service_class, handler
+
+    def give(self, message: Any) -> None:
+        """Call it; the answer goes over a connection, as rospy sends it.
+
+        Raises:
+            Exception: the node has none; rospy tells the caller, and logs a traceback.
+        """
+        try:
+            answer = self.handler(message)
+        except rospy.ServiceException as error:  # it is refused
+            _ROS[-1].say(str(error))
+            return
+        convert_return_to_response(answer, self.service_class._response_class).serialize(io.BytesIO())
 
     def shutdown(self, *_: object) -> None:
         """Offer it no more."""
+        self.unregister()
 
 
 class _Nothing:
@@ -199,11 +218,38 @@ def unconnected(parameters: Mapping[str, Any] | None = None) -> Iterator[Ros]:
         for name, value in replaced.items():
             stack.enter_context(patch.object(rospy, name, value))
         stack.enter_context(patch.object(threading.Thread, "start", lambda _: None))
+        stack.enter_context(patch.object(Inbox, "call", _call))
+        stack.enter_context(patch.object(KeptParameter, "set", _keep))
         stack.enter_context(patch.object(actionlib.ActionServer, "publish_status_async", lambda _: None))
         try:
             yield ros
         finally:
             _ROS.remove(ros)
+
+
+def _call(inbox: Inbox, work: Callable[[], Any], *_: object) -> Any:
+    """Do what a service leaves for the node's loop, which is this thread: after all that was left before."""
+    inbox.drain()
+    return work()
+
+
+def _keep(kept: KeptParameter, value: Any, *_: object) -> None:
+    """Write a parameter at once, as the master would read it.
+
+    Raises:
+        Exception: XML-RPC can't tell it, so it would never be kept.
+    """
+    _ROS[-1].parameters[kept._name] = told_by_master(value)
+
+
+def told_by_master(value: Any) -> Any:
+    """Return a parameter as the master gives it back.
+
+    Raises:
+        Exception: XML-RPC can't tell it.
+    """
+    (read,), _name = xmlrpc.client.loads(xmlrpc.client.dumps((value,)))
+    return read
 
 
 def _silent(*_: object, **__: object) -> None:

@@ -1,4 +1,4 @@
-"""Everything that opens files or listens to topics is tried with bad input, or says why it is not."""
+"""Everything that opens files, listens to topics or answers requests is tried with bad input, or says why it is not."""
 
 import re
 from pathlib import Path
@@ -7,6 +7,7 @@ import pytest
 from bad_input import elsewhere
 from bad_input.listeners import LISTENERS
 from bad_input.readers import READERS, SOURCES
+from bad_input.servers import SERVERS
 from bad_input.subjects import CORPUS, slug, subjects
 
 OPENS = re.compile(
@@ -14,7 +15,8 @@ OPENS = re.compile(
     r"|imread\(|np\.load\(|(?:ElementTree|ET)\.(?:parse|fromstring)\(|DictReader\(|csv\.reader\(|BagFile\(|minidom"
     r"|parquet\.read|expat|\.deserialize\(|parse_yaml\(|parse_marked_yaml\(|b64decode|pickle|parse_package_string"
 )
-LISTENS = re.compile(r"rospy\.Subscriber\(|Action(?:Server|Client)\(|wait_for_message\(")
+LISTENS = re.compile(r"rospy\.Subscriber\(|ActionClient\(|wait_for_message\(")
+SERVES = re.compile(r"rospy\.Service\(|ActionServer\(")
 
 
 def modules(pattern: re.Pattern[str]) -> set[str]:
@@ -30,19 +32,25 @@ def code(path: Path) -> str:
 
 
 @pytest.mark.parametrize(
-    ("pattern", "tried", "exempt"), [(OPENS, READERS, elsewhere.FILES), (LISTENS, LISTENERS, elsewhere.TOPICS)]
+    ("pattern", "tried", "exempt"),
+    [
+        (OPENS, READERS, elsewhere.FILES),
+        (LISTENS, (*LISTENERS, *SERVERS), elsewhere.TOPICS),
+        (SERVES, (*LISTENERS, *SERVERS), elsewhere.SERVICES),
+    ],
 )
 def test_every_module_is_in_a_table(pattern, tried, exempt):
     in_tables = {module for one in tried for module in one.modules} | exempt.keys()
     assert modules(pattern) - in_tables == set(), (
-        "add a reader or listener to tests/bad_input, or a reason to elsewhere.py"
+        "add a reader, listener or server to tests/bad_input, or a reason to elsewhere.py"
     )
 
 
 def test_tables_name_modules_that_exist():
-    named = {module for one in (*READERS, *LISTENERS) for module in one.modules}
+    named = {module for one in (*READERS, *LISTENERS, *SERVERS) for module in one.modules}
     known = {name(path) for path in SOURCES.glob("*/src/**/*.py")}
-    assert (named | elsewhere.FILES.keys() | elsewhere.TOPICS.keys()) - known == set()
+    exempt = elsewhere.FILES.keys() | elsewhere.TOPICS.keys() | elsewhere.SERVICES.keys()
+    assert (named | exempt) - known == set()
 
 
 def test_corpus_has_only_folders_of_subjects():
