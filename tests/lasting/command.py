@@ -34,7 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--output", type=Path, default=FOLDER, help="of the folder lasting-CODE-SEED (default: results/soak)"
     )
     options = parser.parse_args(arguments)
-    tree = code("catkin_ws/src", "tests/soak", "tests/lasting")
+    tree = code("catkin_ws/src", "tests/soak", "tests/lasting", "tests/helpers")
     folder = (options.output / f"lasting-{tree}-{options.seed}").resolve()
     folder.mkdir(parents=True, exist_ok=True)
     runs = [read(path) for path in _paths(folder)]

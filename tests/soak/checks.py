@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 from statistics import median
 
 from soak.observed import Observed, Pose, Sample, Told, Usage
-from soak.plan import DRIVERS, NODE, PARTS, RECORDER, Fault, Kind, Mission
+from soak.plan import DRIVERS, NODE, PARTS, Fault, Kind, Mission
 
 SPEEDS = {"v1": 0.3, "v2": 0.5, "v3": 0.75}
 """m/s, of variants.csv."""
@@ -20,6 +20,11 @@ AGREES_S = 2.0
 """Wall s until what is told agrees with the processes."""
 OLD_DATA_S, COMMAND_S, MARGIN_S = 1.0, 0.5, 0.4
 """ROS s: move_base takes older data as too old; the base stops without a command; a period of sensor and control."""
+CONNECTS_S = 2.0
+"""ROS s until the observer hears a sensor, or the base has no data, of a variant that was told just now."""
+BUSY_S = 60.0
+"""Wall s after which a function may change or recover no more while launcher, manipulator and master work: twice what
+the launcher allows a node under a contested name."""
 NAMED_S = 20.0
 """Wall s until a standing fault is named on /diagnostics."""
 CHANGE_S = 10.0
@@ -78,8 +83,8 @@ def agrees(mission: Mission, observed: Observed) -> Iterator[str]:
         since = since or sample.t
         limit = AGREES_S * observed.stretch(since, sample.t)
         if sample.t - since > limit:
-            what = ", ".join(f"{name} {one} {state}" for name, (one, state) in told.functions.items())
-            yield f"{what}, but {NODE} {'runs' if sample.has(NODE) else 'does not run'} for {sample.t - since:.1f} s"
+            what = f"{NODE} {'runs' if sample.has(NODE) else 'does not run'}"
+            yield f"{_words(told)}, but {what} for {sample.t - since:.1f} s"
             return
 
 
@@ -92,22 +97,44 @@ def _disagrees(told: Told, sample: Sample) -> bool:
     return states == {FAILED} and sample.has(NODE) and not any(one for one, _ in told.functions.values())
 
 
+def comes_to_an_end(mission: Mission, observed: Observed) -> Iterator[str]:
+    """Nothing goes on changing or recovering while those work who do it."""
+    since: float | None = None
+    former: Told | None = None
+    for sample in observed.samples:
+        told = observed.told_at(sample.t)
+        busy = told is not None and any(state in (RECONFIGURING, RECOVERING) for _, state in told.functions.values())
+        if told is None or not busy or not all(sample.works(role) for role in (MANIPULATOR, LAUNCHER, "master")):
+            since = None
+            continue
+        if former is None or former.functions != told.functions or since is None:
+            since, former = sample.t, told
+        if sample.t - since > BUSY_S * observed.stretch(since, sample.t):
+            yield f"{_words(told)} for {sample.t - since:.0f} s"
+            return
+
+
+def _words(told: Told) -> str:
+    return ", ".join(f"{name} {one} {state}" for name, (one, state) in told.functions.items())
+
+
 def sees_where_it_goes(mission: Mission, observed: Observed) -> Iterator[str]:
     """The robot does not move for longer than the time-outs allow without current data of a sensor."""
     limit = OLD_DATA_S + COMMAND_S + MARGIN_S
     stamps: dict[str, float] = {}
+    wanted: dict[str, float] = {}
     scans = iter(observed.scans)
     scan = next(scans, None)
-    if scan is None:
-        return
     for pose in observed.poses:
         while scan is not None and scan.t <= pose.t:
             if scan.stamp <= pose.ros + MARGIN_S:  # not from the future
                 stamps[scan.topic] = max(scan.stamp, stamps.get(scan.topic, 0.0))
             scan = next(scans, None)
-        newest = max((stamps.get(topic, -math.inf) for topic in _sensors(observed, pose)), default=-math.inf)
+        sensors = _sensors(observed, pose)
+        wanted = {topic: wanted.get(topic, pose.ros + CONNECTS_S) for topic in sensors}
+        newest = max((stamps.get(topic, wanted[topic]) for topic in sensors), default=math.inf)
         age = pose.ros - newest
-        if pose.speed > MOVES and limit + 0.3 * (observed.stretch(pose.t, pose.t) - 1.0) < age < math.inf:
+        if pose.speed > MOVES and age > limit + 0.3 * (observed.stretch(pose.t, pose.t) - 1.0):
             yield f"{pose.speed:.2f} m/s at {pose.ros:.2f} s, data {age:.2f} s old"
             return
 
@@ -151,15 +178,18 @@ def stays_small(mission: Mission, observed: Observed) -> Iterator[str]:
 
 
 def names_what_is_broken(mission: Mission, observed: Observed) -> Iterator[str]:
-    """A driver that is dead or stopped for good is named on /diagnostics."""
+    """A driver that is dead or stopped for good, and a part that is stopped for good, is named on /diagnostics."""
     last = observed.samples[-1].t if observed.samples else 0.0
     for strike in observed.struck():
         fault = mission.faults[strike.index]
         if fault.kind not in _STOPS:
             continue
+        stands = (*DRIVERS, *PARTS) if fault.kind is Kind.FREEZE_FOR_GOOD else DRIVERS  # a dead part is started again
         for role in fault.targets:
             until = strike.t + NAMED_S * observed.stretch(strike.t, strike.t + NAMED_S)
-            if role not in DRIVERS or until > last or not _monitored(observed, strike.t, until):
+            if role not in stands or until > last:
+                continue
+            if role in DRIVERS and not _monitored(observed, strike.t, until):
                 continue
             if not any(strike.t <= one.t <= until and role in one.text for one in observed.troubles):
                 yield f"{role} ({fault.kind.value}) within {until - strike.t:.0f} s"
@@ -201,18 +231,29 @@ _REASONS = {
 
 def excuse_of(mission: Mission, observed: Observed) -> str:
     """Return why a mission may fail: what has struck leaves no variant, or nobody to say so; empty: nothing does."""
-    for strike in observed.struck():
-        fault = mission.faults[strike.index]
-        if fault.kind.ends_mission or fault.targets == (RECORDER,):
+    struck = [(strike, mission.faults[strike.index]) for strike in observed.struck()]
+    for _, fault in struck:
+        if fault.kind.ends_mission:
             return str(fault)
-        if fault.kind is Kind.DATA and any(name in strike.note for name in _AUTHORITIES):
-            return f"{fault}: {strike.note}"
-    dead = {role for strike in observed.struck() for role in _lost_for_good(mission.faults[strike.index])}
+    dead = {role for _, fault in struck for role in _lost_for_good(fault)}
     if dead.issuperset(DRIVER_OF.values()):
         return "no sensor is left"
     if "robot_state_publisher" in dead:
         return "the frames of the robot are gone"
-    return _hangs_when_needed(mission, observed)
+    return _hangs_when_needed(mission, observed) or _somebody_elses_goal(mission, observed)
+
+
+def _somebody_elses_goal(mission: Mission, observed: Observed) -> str:
+    """Return which words of a stranger have taken the goal from the robot, as the end of the mission tells."""
+    end = observed.event("MISSION_END")
+    reason = end.values.get("reason", "") if end else ""
+    if not any(word in reason for word in _TAKEN):
+        return ""
+    for strike in observed.struck():
+        fault = mission.faults[strike.index]
+        if fault.kind is Kind.DATA and any(name in strike.note for name in _AUTHORITIES):
+            return f"{fault}: {strike.note}"
+    return ""
 
 
 def _hangs_when_needed(mission: Mission, observed: Observed) -> str:
@@ -229,8 +270,10 @@ def _hangs_when_needed(mission: Mission, observed: Observed) -> str:
     return ""
 
 
-_AUTHORITIES = ("/tf", "/move_base/goal", "/move_base/cancel", "/move_base_simple/goal")
-"""Whoever publishes there tells the robot where it is, or what it shall do: wrong words are obeyed."""
+_AUTHORITIES = ("/move_base/goal", "/move_base/cancel", "/move_base_simple/goal")
+"""Whoever publishes there tells the robot what it shall do: wrong words are obeyed."""
+_TAKEN = ("preempted", "cancelled")
+"""Words of which one is in the reason where somebody has taken the goal back, or has given another one."""
 
 
 def _lost_for_good(fault: Fault) -> tuple[str, ...]:
@@ -276,6 +319,7 @@ CHECKS: Mapping[str, Check] = {
     "no process is left behind": nothing_left,
     "no two of one role": one_of_each,
     "what is told agrees with the processes": agrees,
+    "what is under way comes to an end": comes_to_an_end,
     "the robot sees where it goes": sees_where_it_goes,
     "the robot keeps the speed of its variant": keeps_the_speed,
     "memory and descriptors stay flat": stays_small,

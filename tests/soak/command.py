@@ -160,7 +160,7 @@ def own_network() -> tuple[str, ...]:
 
 
 def _tree() -> str:
-    return code("catkin_ws/src", "tests/soak")
+    return code("catkin_ws/src", "tests/soak", "tests/helpers")
 
 
 def _interrupt(_number: int, _frame: object) -> None:

@@ -285,7 +285,7 @@ def judge(plan: Mission, observed: Observed, left_out: dict[int, str], wall_s: f
     end = observed.event("MISSION_END")
     status = observed.end.status if observed.end else None
     outcome = f"{end.values['outcome']}: {end.values.get('reason', '')}" if end else f"status {status}"
-    memory = {usage.role: usage.memory for usage in observed.usages if usage.role}
+    memory = {usage.role: usage.memory for usage in observed.usages if usage.role and usage.memory}  # 0: it ends
     return Record(
         plan.number,
         outcome,

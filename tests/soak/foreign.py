@@ -10,6 +10,7 @@ It says in one line what it met, and then does it.
 
 from __future__ import annotations
 
+import contextlib
 import random
 import sys
 import threading
@@ -23,7 +24,7 @@ import rosservice
 from rosgraph_msgs.msg import Clock
 
 from soak.plan import NODE, PARTS
-from soak.spoiling import example, spoiled
+from soak.spoiling import AS_IT_IS, can_spoil, differ, example, spoiled
 from soak.striking import SAYS
 
 OURS = {f"/{name}" for name in (*PARTS, NODE)}
@@ -52,15 +53,14 @@ def data(pick: str, how: str, seconds: str) -> None:
     _, subscribers, _ = master.getSystemState()
     heard = sorted(topic for topic, nodes in subscribers if OURS & set(nodes) and topic not in _LEFT_OUT)
     types = dict(master.getTopicTypes())
-    topic = chosen(heard, float(pick))
-    kind = roslib.message.get_message_class(types.get(topic, ""))
-    if kind is None:
-        say(f"left out: {topic} has the type {types.get(topic)}")
-        return
-    try:
-        message = rospy.wait_for_message(topic, kind, 2.0)
-    except rospy.ROSException:
-        message = example(kind)
+    kinds = {topic: roslib.message.get_message_class(types.get(topic, "")) for topic in heard}
+    topic = chosen([one for one in heard if kinds[one] is not None and can_spoil(kinds[one], how)], float(pick))
+    kind: Any = kinds[topic]
+    message = example(kind)
+    with contextlib.suppress(rospy.ROSException):
+        heard_now = rospy.wait_for_message(topic, kind, 2.0)
+        if how in AS_IT_IS or differ(heard_now, spoiled(heard_now, how, random.Random(pick))):
+            message = heard_now
     publisher = rospy.Publisher(topic, kind, queue_size=10)
     _wait(lambda: publisher.get_num_connections() > 0)
     say(f"{topic}, {how}")
@@ -78,7 +78,9 @@ def service(pick: str, how: str) -> None:
     """Call one of the services that our nodes offer."""
     _, _, services = rosgraph.Master(rospy.get_name()).getSystemState()
     offered = sorted(name for name, nodes in services if OURS & set(nodes))
-    name = chosen(offered, float(pick))
+    first = offered.index(chosen(offered, float(pick)))
+    found = (one for one in (*offered[first:], *offered[:first]) if _can_ask(one, how))
+    name = next(found, None) or chosen([], 0.0)
     kind = rosservice.get_service_class_by_name(name)
     request = spoiled(example(kind._request_class), how, random.Random(pick))
     say(f"{name}, {how}")
@@ -95,6 +97,15 @@ def service(pick: str, how: str) -> None:
     caller = threading.Thread(target=call, daemon=True)
     caller.start()
     caller.join(5.0)
+
+
+def _can_ask(name: str, how: str) -> bool:
+    """Tell whether a request to a service can be wrong in a way; its node may hang, or have ended just now."""
+    try:
+        kind = rosservice.get_service_class_by_name(name)
+    except rosservice.ROSServiceException:
+        return False
+    return kind is not None and can_spoil(kind._request_class, how)
 
 
 def usurp(name: str, seconds: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import io
 import math
 import random
 from typing import Any
@@ -13,7 +14,27 @@ import roslib.message
 WRONG_FRAME = "no/such frame"
 SHIFT_S = 1000.0
 """By how much a stamp is wrong."""
+AS_IT_IS = ("repeat", "flood")
+"""Ways in which no message is wrong by itself, but how often it comes."""
 _FLOATS = ("float32", "float64")
+_USUAL = {"string": "text", "bool": True, "time": genpy.Time(2000), "duration": genpy.Duration(1)}
+
+
+def can_spoil(message_class: Any, how: str) -> bool:
+    """Tell whether messages of a type can be wrong in a way: it has a field for that."""
+    right = example(message_class)
+    return how in AS_IT_IS or differ(right, spoiled(right, how, random.Random(0)))
+
+
+def differ(one: Any, other: Any) -> bool:
+    """Tell whether two messages of one type differ, as they are sent."""
+    return _sent(one) != _sent(other)
+
+
+def _sent(message: Any) -> bytes:
+    buffer = io.BytesIO()
+    message.serialize(buffer)
+    return buffer.getvalue()
 
 
 def spoiled(message: Any, how: str, draw: random.Random) -> Any:
@@ -34,16 +55,8 @@ def _spoil(message: Any, how: str, draw: random.Random) -> None:
         return
     for name, kind in zip(message.__slots__, message._slot_types, strict=True):
         setattr(message, name, _value(getattr(message, name), kind, how, draw))
-    if message._type == "std_msgs/Header":
-        _spoil_header(message, how)
-
-
-def _spoil_header(header: Any, how: str) -> None:
-    if how == "wrong frame":
-        header.frame_id = WRONG_FRAME
-    shift = {"future": SHIFT_S, "past": -SHIFT_S}.get(how)
-    if shift is not None:
-        header.stamp = genpy.Time.from_sec(max(0.0, header.stamp.to_sec() + shift))
+    if message._type == "std_msgs/Header" and how == "wrong frame":
+        message.frame_id = WRONG_FRAME
 
 
 def _value(value: Any, kind: str, how: str, draw: random.Random) -> Any:
@@ -51,6 +64,9 @@ def _value(value: Any, kind: str, how: str, draw: random.Random) -> Any:
         return _array(value, kind, how, draw)
     if kind in _FLOATS:
         return {"nan": math.nan, "infinite": draw.choice((math.inf, -math.inf))}.get(how, value)
+    if kind == "time":
+        shift = {"future": SHIFT_S, "past": -SHIFT_S}.get(how, 0.0)
+        return genpy.Time.from_sec(max(0.0, value.to_sec() + shift)) if shift else value
     if kind == "string" and how in ("empty", "wrong size"):
         return "" if how == "empty" else "x" * 100_000
     if "/" in kind or kind == "Header":
@@ -74,17 +90,18 @@ def _array(value: Any, kind: str, how: str, draw: random.Random) -> Any:
 
 
 def example(message_class: Any) -> Any:
-    """Return a message of a type with one element in each of its arrays."""
+    """Return a message of a type with a value in each field, and with one element in each of its arrays."""
     message = message_class()
     for name, kind in zip(message.__slots__, message._slot_types, strict=True):
-        value = getattr(message, name)
-        if kind.endswith("[]"):
-            element = kind[:-2]
-            if element in _FLOATS:
-                setattr(message, name, [1.0])
-            elif "/" in element:
-                found = roslib.message.get_message_class(element)
-                setattr(message, name, [example(found)] if found else [])
-        elif hasattr(value, "_slot_types") and value.__slots__:
-            setattr(message, name, example(type(value)))
+        element, _, size = kind.rpartition("[")
+        if size == "]":
+            setattr(message, name, bytes(1) if element in ("uint8", "char") else [_example_of(element)])
+        elif not element:
+            setattr(message, name, _example_of(kind))
     return message
+
+
+def _example_of(kind: str) -> Any:
+    if "/" in kind or kind == "Header":
+        return example(roslib.message.get_message_class("std_msgs/Header" if kind == "Header" else kind))
+    return _USUAL.get(kind, 1.0 if kind in _FLOATS else 1)

@@ -232,9 +232,7 @@ class Striker:
         for port in sorted(ports):
             for number in range(CONNECTIONS):
                 one = socket.create_connection((address.hostname or "localhost", port), 2.0)
-                one.sendall(
-                    (b"", b"POST /RPC2 HTTP/1.1\r\nContent-Length: 900\r\n\r\n<?xml", b"\xff\x00\x00")[number % 3]
-                )
+                one.sendall(HALVES[number % len(HALVES)])
                 open_sockets.append(one)
         return f"{len(open_sockets)} connections to {fault.targets[0]}", lambda: _close(open_sockets)
 

@@ -4,10 +4,12 @@ import math
 import random
 
 import pytest
+from actionlib_msgs.msg import GoalID
 from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState, LaserScan
-from soak.spoiling import WRONG_FRAME, example, spoiled
+from soak.spoiling import WRONG_FRAME, can_spoil, example, spoiled
+from std_srvs.srv import TriggerRequest
 
 SCAN = LaserScan(ranges=[1.0, 2.0, 3.0, 4.0], angle_min=-1.0)
 SCAN.header.stamp.secs, SCAN.header.frame_id = 2000, "laser"
@@ -51,3 +53,19 @@ def test_what_is_wrong_can_be_sent(kind, how):
 
 def test_example_has_an_element_in_each_list():
     assert len(example(DiagnosticArray).status) == 1 and len(example(JointState).position) == 1
+
+
+@pytest.mark.parametrize(
+    ("kind", "how", "can"),
+    [
+        (LaserScan, "nan", True),
+        (GoalID, "nan", False),
+        (GoalID, "future", True),
+        (GoalID, "empty", True),
+        (GoalID, "wrong frame", False),
+        (TriggerRequest, "empty", False),
+        (TriggerRequest, "repeat", True),
+    ],
+)
+def test_only_what_has_the_fields_can_be_wrong_in_a_way(kind, how, can):
+    assert can_spoil(kind, how) == can
