@@ -1,9 +1,14 @@
-"""The root launch files: which world they take, and what the monitor is told of the window."""
+"""The root launch files: which world they take, what the monitor is told of the window, and what ends a bad start."""
 
+import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 import yaml
+from helpers.waiting import DEADLINE_S
+from metacontrol_experiments.lockstep.system import parameter_tree
 from roslaunch.config import ROSLaunchConfig
 from roslaunch.xmlloader import XmlLoader
 
@@ -11,10 +16,30 @@ PACKAGE = Path(__file__).parents[3] / "catkin_ws/src/metacontrol_sim"
 ROOTS = ["metacontrol_sim_reasoner.launch", "MVP_metacontrol_world.launch"]
 
 
-def parameters(file, *arguments):
+MANAGED = ("managed.launch", "manager:=rules")
+MANIPULATOR = """
+import json, sys
+import rospy
+from node_kit.ros.lifetime import Lifetime
+from rosgraph_manipulator.ros import manipulator
+
+own = json.loads(sys.argv.pop())
+Lifetime.start = lambda *_, **__: None
+rospy.get_param = lambda name, default=None: own.get(name.lstrip("~"), default)
+manipulator.main()
+"""
+"""The node, with parameters and without a master."""
+
+
+def loaded(file, *arguments, package=PACKAGE):
     config = ROSLaunchConfig()
-    XmlLoader(resolve_anon=False).load(str(PACKAGE / "launch" / file), config, argv=list(arguments), verbose=False)
-    return {name: parameter.value for name, parameter in config.params.items()}
+    XmlLoader(resolve_anon=False).load(str(package / "launch" / file), config, argv=list(arguments), verbose=False)
+    return config
+
+
+def parameters(file, *arguments, package=PACKAGE):
+    params = loaded(file, *arguments, package=package).params
+    return {name: parameter.value for name, parameter in params.items()}
 
 
 @pytest.mark.parametrize("file", [*ROOTS, "robot.launch"])
@@ -52,3 +77,29 @@ def test_mission_without_surroundings_has_all_other_observers(file):
 def test_published_reasoner_has_no_surroundings():
     observers = parameters("metacontrol_sim_reasoner.launch", "as_published:=true")["/rosgraph_monitor/observers"]
     assert "LightObserver" not in observers
+
+
+@pytest.mark.parametrize(
+    ("package", "arguments"),
+    [
+        *(("metacontrol_sim", (file,)) for file in (*ROOTS, "robot.launch")),
+        ("metacontrol_experiments", MANAGED),
+        ("metacontrol_manipulation", ("robot.launch",)),
+    ],
+)
+def test_simulator_that_refuses_to_start_ends_the_whole_launch(package, arguments):
+    nodes = loaded(*arguments, package=PACKAGE.parent / package).nodes
+    assert [(node.required, node.respawn) for node in nodes if node.name == "simulator"] == [(True, False)]
+
+
+@pytest.mark.parametrize(
+    ("package", "arguments"),
+    [*(("metacontrol_sim", (file,)) for file in ROOTS), ("metacontrol_experiments", MANAGED)],
+)
+def test_variant_to_begin_with_that_does_not_exist_is_told_in_one_line(package, arguments):
+    given = parameters(*arguments, "nav_profile:=f9_v9_r9", package=PACKAGE.parent / package)
+    own = parameter_tree({name.removeprefix("/rosgraph_manipulator/"): value for name, value in given.items()})
+    words = [sys.executable, "-c", MANIPULATOR, json.dumps(own)]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=DEADLINE_S, check=False)
+    said = "rosgraph_manipulator: parameter '~initial_configuration' is 'f9_v9_r9'; known are: f1_v1_r1, "
+    assert (done.returncode, done.stderr.count("\n"), done.stderr[: len(said)]) == (2, 1, said)

@@ -148,15 +148,25 @@ def test_manager_is_what_the_launch_file_starts(monkeypatch, manager, file, node
     assert ("as_published:=true" in command) == (manager == "as_published")
 
 
-@pytest.mark.parametrize("options", [["--gui"], ["--mission", "manipulation", "--gui"]])
+@pytest.mark.parametrize("options", [["--gui"], ["--rviz"], ["--mission", "manipulation", "--gui"]])
 def test_window_without_a_display_is_refused_before_anything_starts(monkeypatch, tmp_path, options):
     monkeypatch.setenv("DISPLAY", ":250")
+    monkeypatch.setattr(runner, "_find", lambda package, kind: f"/opt/{package}/{kind}")
+    monkeypatch.setattr(runner, "_run_alone", lambda *_: pytest.fail("the system was started"))
     kept = tmp_path / "summary.json"
     kept.write_text("{}")
     result = CliRunner().invoke(metacontrol, ["run", "--quiet", "--output", str(tmp_path), *options])
     assert result.exit_code == 2
-    assert "--gui: a window needs" in result.output
+    assert result.output.count("\n") == 1 and f"{options[-1]}: a window needs" in result.output
     assert kept.exists(), "results of an earlier run"
+
+
+def test_rviz_that_is_not_installed_is_refused_before_anything_starts(monkeypatch, tmp_path):
+    monkeypatch.setattr(runner, "_find", lambda *_: "")
+    monkeypatch.setattr(runner, "_run_alone", lambda *_: pytest.fail("the system was started"))
+    result = CliRunner().invoke(metacontrol, ["run", "--quiet", "--output", str(tmp_path), "--rviz"])
+    assert result.exit_code == 2
+    assert result.output.count("\n") == 1 and "--rviz: RViz is not installed: ./mros setup --gui" in result.output
 
 
 @pytest.mark.parametrize("options", [[], ["--mission", "manipulation"]])

@@ -25,16 +25,18 @@ class Node:
 
     def __init__(self, check, said, log, waits_for):
         self.check, self.said, self.log, self.waits_for = check, said, log, waits_for
-        self.drove = self.closed = False
+        self.drove = self.closed = self.is_recorded = False
 
     def start_up(self):
         pass
 
     def wait_recorded(self, _recorder, _topics):
+        self.is_recorded = True
         if self.waits_for == "recorder":
             assert wait_until(lambda: bool(self.check()) or "up" in self.log.read_text(), DEADLINE_S)
 
     def drive(self):
+        assert self.is_recorded, "a mission begins once its recorder receives"
         if self.waits_for == "its end":
             assert wait_until(lambda: bool(self.check()) or len(self.said) > 1, DEADLINE_S)
         self.check()

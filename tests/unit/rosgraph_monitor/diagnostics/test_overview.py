@@ -4,6 +4,7 @@ import pytest
 from click.testing import CliRunner
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from metacontrol_msgs.msg import ActiveConfiguration, FunctionGrounding
+from node_kit.parts import Sign
 from rich.console import Console
 from ros_model.graph.snapshot import build_snapshot
 from rosgraph_monitor.cli import snapshot
@@ -74,6 +75,39 @@ def test_what_others_say_neither_styles_a_table_nor_controls_the_terminal(value,
     text = shown(overview, 0.0)
     assert value.encode("unicode_escape").decode() in text
     assert not {"\x1b", "\x07", "\x9b"} & set(text)
+
+
+def cells(text, name):
+    """The cells of the row that begins with a name, or has it in its second column."""
+    rows = [[cell.strip() for cell in line.strip("│").split("│")] for line in text.splitlines() if "│" in line]
+    return next(row for row in rows if name in row[:2])
+
+
+def test_board_that_hears_no_monitor_says_that_nobody_watches():
+    text = shown(Overview(), 0.0)
+    assert cells(text, "monitor") == ["monitor", "", "not heard: nobody watches what is below"]
+    assert cells(text, "laser")[1] == "registered, not watched"
+
+
+def test_part_that_gives_no_sign_of_life_is_shown_as_silent_and_nodes_as_not_watched():
+    overview = Overview()
+    for part in ("monitor", "reasoner"):
+        overview.parts.hear(Sign(f"/rover/{part}_1", part, "http://a:1", 300.0), 10.0)
+    text = shown(overview, 11.0)
+    assert cells(text, "/rover/monitor_1") == ["monitor", "/rover/monitor_1", "runs"]
+    assert cells(text, "laser")[1] == "registered" and "nobody watches" not in text
+    overview.parts.hear(Sign("/rover/reasoner_1", "reasoner", "http://a:1", 300.0), 16.0)
+    text = shown(overview, 17.0)
+    assert cells(text, "/rover/monitor_1") == ["monitor", "/rover/monitor_1", "silent for 7 s"]
+    assert cells(text, "/rover/reasoner_1")[2] == "runs"
+    assert cells(text, "laser")[1] == "registered, not watched"
+    assert "not heard: nobody watches what is below" in text
+
+
+def test_what_the_monitor_has_said_is_shown_whoever_watches():
+    overview = Overview()
+    overview.take([status("laser", "Component status", ("laser", "FALSE"), ("reason", "hangs"), level=2)], 0.0)
+    assert cells(shown(overview, 0.0), "laser")[1] == "FALSE: hangs"
 
 
 def test_thresholds_are_found_wherever_they_stand():
