@@ -5,7 +5,7 @@ import pytest
 from actionlib import msg as actionlib_test_messages
 from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from rosgraph_manipulator.goals.clients import Client
-from rosgraph_manipulator.goals.goal_keeper import LATE_STATUSES, GoalKeeper
+from rosgraph_manipulator.goals.goal_keeper import LATE_STATUSES, UNNAMED_STATUSES, GoalKeeper
 
 CLIENT = Client("/script", "http://host:1")
 
@@ -165,6 +165,52 @@ def test_end_of_which_no_message_comes_is_no_end_of_a_much_later_goal(keeper):
         keeper.on_status(status("server-1", GoalStatus.REJECTED))
     keeper.on_goal(goal(""))
     assert keeper.pending_id == ""
+
+
+def late(keeper, end="server-1"):
+    """A goal without an id comes so long after the server has told its end that nobody remembers that."""
+    for _ in range(LATE_STATUSES + 1):
+        keeper.on_status(status(end, GoalStatus.REJECTED))
+    keeper.on_goal(goal("", 0))
+
+
+def test_goal_without_an_id_that_comes_late_after_its_end_is_given_up_for_the_one_at_work(keeper):
+    late(keeper)
+    for _ in range(UNNAMED_STATUSES + 1):
+        keeper.on_status(status("a", GoalStatus.ACTIVE))
+    assert keeper.pending_id == "a"
+    keeper.on_result(result("a", GoalStatus.SUCCEEDED))
+    assert keeper.pending is None
+
+
+def test_goal_without_an_id_is_kept_while_no_server_could_name_it(keeper):
+    keeper.server_changes(True)
+    keeper.on_goal(goal("", 0))
+    for _ in range(2 * UNNAMED_STATUSES):
+        keeper.on_status(status("a", GoalStatus.ABORTED))
+    assert keeper.pending_id == ""
+
+
+def test_goal_whose_message_comes_after_the_server_has_listed_it_keeps_its_own_content():
+    keeper = GoalKeeper()
+    late(keeper)
+    wanted = goal("b", 3)
+    wanted.goal.goal = 7
+    keeper.on_status(status("b", GoalStatus.ACTIVE))
+    keeper.on_goal(wanted, CLIENT)
+    assert (keeper.pending.goal.goal, keeper.client) == (7, CLIENT)
+    repeated = goal("b", 3)
+    repeated.goal.goal = 9  # of somebody who takes its id: the server has the first
+    keeper.on_goal(repeated)
+    assert keeper.pending.goal.goal == 7
+
+
+def test_goal_that_the_server_has_named_keeps_its_client_when_we_repeat_it():
+    keeper = GoalKeeper()
+    keeper.on_goal(goal("", 0), CLIENT)
+    keeper.on_status(status("server-1", GoalStatus.ACTIVE))
+    keeper.on_goal(keeper.pending)
+    assert (keeper.pending_id, keeper.client) == ("server-1", CLIENT)
 
 
 def test_ends_from_before_the_keeper_are_none_of_a_goal_without_an_id():

@@ -29,6 +29,9 @@ ENDS_OF_THE_NEWEST = frozenset({GoalStatus.REJECTED, GoalStatus.SUCCEEDED, GoalS
 """How a goal ends by itself; the others are replaced or cancelled."""
 MOST_EARLIER = 10  # goals that the server may go back to: it has one at work, and rejects a goal within milliseconds
 LATE_STATUSES = 5  # every 0.2 s: the message of a goal does not come later than that after its end
+UNNAMED_STATUSES = 15
+"""Statuses, every 0.2 s, that list nothing that a goal could be that came without an id. Its end was told before it
+came then, on a busy machine. Else it would wait for ever, and be taken for the next goal."""
 
 
 class GoalKeeper:
@@ -47,6 +50,8 @@ class GoalKeeper:
         # Goals of which the end has come, but no message yet, with how many statuses may come before it. One without an
         # id can't be told from others by its message.
         self._nameless: OrderedDict[str, int] = OrderedDict()
+        self._unnamed = 0  # statuses since the pending goal came without an id
+        self._guessed = ""  # the id that such a goal was given by a status: maybe that of a goal whose message is late
         self._has_status = False  # whether a status has come: what ended before is known
         self._changing = False
         self._doubted = False  # the goal was known to an earlier keeper: the server has to confirm it
@@ -161,6 +166,8 @@ class GoalKeeper:
         if not goal_id and self._nameless:
             self._nameless.popitem(last=False)  # the server has named it, and told its end, before it came here
             return
+        if goal_id and goal_id == self._guessed == self.pending_id and goal.goal != self._goal.goal:
+            self._goal = None  # what came without an id had ended before
         is_newer = not goal_id or goal_id != self.pending_id
         if is_newer and self.pending_id:
             _remember(self._replaced, self.pending_id)
@@ -172,7 +179,7 @@ class GoalKeeper:
             self._client, self._repeats, self._is_repeat = client, 0, False
         if is_newer:
             self._earlier.pop(goal_id, None)
-            self._goal = copy.deepcopy(goal)
+            self._goal, self._unnamed, self._guessed = copy.deepcopy(goal), 0, ""
         self._doubted, self._cancelled = False, None
 
     def on_status(self, status: Any) -> None:
@@ -187,14 +194,23 @@ class GoalKeeper:
             if self._is_without_id and state in AT_WORK and not self._is_known(goal_id):
                 # The server made up an id for a goal that came without one.
                 self._goal.goal_id.id, self._goal.goal_id.stamp = goal_id, entry.goal_id.stamp
+                self._guessed = goal_id
             if state == GoalStatus.ACTIVE and goal_id == self.pending_id:
                 self._earlier.clear()
         self._has_status = True
+        self._give_up_unnamed()
         self._doubt_cancellation()
         if self._doubted and not self._changing:
             if not self.is_at_work:
                 self._goal = None
             self._doubted = False
+
+    def _give_up_unnamed(self) -> None:
+        """Go back from a goal that came without an id, where the server has shown for long that it has none such."""
+        self._unnamed = self._unnamed + 1 if self._is_without_id and not self._changing else 0
+        if self._unnamed > UNNAMED_STATUSES:
+            self._goal = None
+            self._go_back()
 
     def _doubt_cancellation(self) -> None:
         """Make a cancelled goal pending again where the server still works at it.
@@ -246,11 +262,14 @@ class GoalKeeper:
             else:
                 _remember(self._nameless, goal_id, LATE_STATUSES)
         is_rejected = state == GoalStatus.REJECTED and goal_id == self.pending_id
-        earlier = next(reversed(self._earlier.values()), None) if is_rejected else None
         self._finish(goal_id, is_rejected)  # also one not known yet: a result may arrive here before its goal
-        if earlier is not None:
-            self._goal, self._client, self._doubted = earlier  # the server goes on with it
-            del self._earlier[self._goal.goal_id.id]
+        if is_rejected:
+            self._go_back()
+
+    def _go_back(self) -> None:
+        """Have the goal pending again that the last one had replaced, which the server did not take: it goes on."""
+        if self._earlier:
+            self._goal, self._client, self._doubted = self._earlier.popitem()[1]
             self._repeats, self._is_repeat = 0, False
 
     def _is_known(self, goal_id: str) -> bool:
