@@ -30,6 +30,7 @@ class NodeProcess:
         ready: whether it is registered and answers.
         alive: whether it runs.
         hung: whether it is stopped or stuck.
+        since: when it last began or ceased to work, s.
         status: exit status once it has ended.
         ending: whether it was asked to end.
         configuration: for which it was started last.
@@ -42,8 +43,14 @@ class NodeProcess:
     ready: bool = False
     alive: bool = True
     hung: bool = False
+    since: float = 0.0
     status: int | None = None
     ending: bool = False
+
+    @property
+    def answers(self) -> bool:
+        """Whether it works."""
+        return self.alive and self.ready and not self.hung
 
 
 @dataclass
@@ -110,7 +117,7 @@ class Host:
     def kill(self, process: NodeProcess, status: int = -9) -> None:
         """End a process at once; it stays registered."""
         if process.alive:
-            process.alive, process.status = False, status
+            process.alive, process.status, process.since = False, status, self.kernel.now
             for told in self.on_end:
                 told(process)
 
@@ -122,18 +129,18 @@ class Host:
 
     def freeze(self, process: NodeProcess) -> None:
         """Have a process hang."""
-        process.hung = True
+        self._hang(process, True)
 
     def thaw(self, process: NodeProcess) -> None:
         """Have a process go on; it heeds a request that came meanwhile."""
-        process.hung = False
+        self._hang(process, False)
         if process.alive and process.ending:
             self.ask_to_end(process)
 
     def answering(self, name: str) -> NodeProcess | None:
         """Return the process that answers under a name; None: nobody does."""
         process = self.registered.get(name)
-        return process if process and process.alive and process.ready and not process.hung else None
+        return process if process and process.answers else None
 
     def ros_time(self) -> float:
         """Return ROS time, s: it may stand or jump where a simulator gives it."""
@@ -174,6 +181,10 @@ class Host:
             self.parameters.pop(name, None)
         self.parameters.update(values)
 
+    def _hang(self, process: NodeProcess, hung: bool) -> None:
+        if process.alive and process.hung is not hung:
+            process.hung, process.since = hung, self.kernel.now
+
     def _register(self, process: NodeProcess) -> None:
         if not process.alive:
             return
@@ -184,7 +195,7 @@ class Host:
         if before is not None and before is not process and before.alive:
             self.ask_to_end(before)  # as the master does
         self.registered[process.name] = process
-        process.ready = True
+        process.ready, process.since = True, self.kernel.now
         behaviour = self.behaviours.get(process.name)
         if behaviour and behaviour.dies_after is not None:
             self.kernel.after(behaviour.dies_after, lambda: self.kill(process, 1))

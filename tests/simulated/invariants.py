@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from metacontrol_msgs.msg import FunctionGrounding
 from rosgraph_launcher.launching.report import CHANGING, RECOVERING
 
+from simulated.alarms import Alarms
 from simulated.launcher import LauncherPart
 from simulated.world import World
 
@@ -20,6 +21,7 @@ class Invariants:
 
     def __init__(self, world: World) -> None:
         self._world = world
+        self._alarms = Alarms(world)
         self._next_look = 0.0
         self._quiet_since: float | None = None
 
@@ -30,6 +32,7 @@ class Invariants:
         if world.kernel.now >= self._next_look:
             self._next_look = world.kernel.now + 0.05
             self._see_roles()
+            world.broken += self._alarms.missing()
             if self.is_quiet():
                 world.broken += list(disagreements(world))
 

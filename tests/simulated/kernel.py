@@ -60,6 +60,7 @@ class Process:
         alive: whether it runs.
         frozen: whether it is stopped (SIGSTOP): its tasks go on when it continues.
         started: when it has begun, s.
+        awake_since: when it has begun or gone on last, s.
     """
 
     def __init__(self, kernel: Kernel, name: str, failed: Callable[[str, BaseException], object]) -> None:
@@ -72,7 +73,7 @@ class Process:
         """
         self.kernel, self.name, self._failed = kernel, name, failed
         self.alive, self.frozen = True, False
-        self.started = kernel.now
+        self.started = self.awake_since = kernel.now
         self._tasks: list[greenlet] = []
         self._late: list[Callable[[], object]] = []
 
@@ -128,6 +129,8 @@ class Process:
 
     def thaw(self) -> None:
         """Let the process go on."""
+        if self.frozen:
+            self.awake_since = self.kernel.now
         self.frozen = False
         late, self._late = self._late, []
         for work in late:

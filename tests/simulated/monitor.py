@@ -28,13 +28,20 @@ NAME = "rosgraph_monitor"
 
 
 class MonitorPart:
-    """One process of the monitor."""
+    """One process of the monitor.
+
+    Attributes:
+        head_start: for how long others had run when it began, s.
+        told: what it has published last.
+    """
 
     def __init__(
         self, process: Process, host: Host, system: System, topics: Mapping[str, Topic], head_start: float
     ) -> None:
-        """Begin; `head_start`: for how long others had run, s."""
+        """Begin."""
         self.process, self._host, self._system, self._topics = process, host, system, topics
+        self.head_start = head_start
+        self.told: tuple[Any, ...] = ()
         self._inbox = Inbox(process)
         self._model = DesiredModel(system.base, self._read, system.variants.values)
         self._monitor = GraphEvaluator(system.components, scope=Scope(namespace=system.namespace))
@@ -42,6 +49,7 @@ class MonitorPart:
         self._known: dict[str, NodeProcess] = {}
         self._grace = Patience().grace(head_start)
         self._snapshot: GraphSnapshot | None = None
+        self._shown: tuple[Any, ...] = ()  # what the snapshot shows
         topics["diagnostics"].advertise(process)
         topics["active"].subscribe(process, self._follow, queue=5)
         host.on_end.append(self._on_end)
@@ -54,7 +62,8 @@ class MonitorPart:
                 lives = {key: state.life for key, state in self._lives.items()}
                 now, desired = self._host.kernel.now, self._model.current
                 statuses = self._monitor.evaluate(self._snapshot, lives, desired, now, grace=self._grace)
-                self._topics["diagnostics"].publish(self.process, _messages(statuses))
+                self.told = _messages(statuses)
+                self._topics["diagnostics"].publish(self.process, self.told)
             self.process.pause(0.02)
             self._inbox.wait(PERIOD)
             self._inbox.drain()
@@ -63,8 +72,10 @@ class MonitorPart:
         self.process.pause(0.01)
         if self._host.kernel.now < self._host.silent_until:
             return self._snapshot is not None
-        self._known = dict(self._host.registered)
-        self._snapshot = _snapshot(self._system, self._host)
+        shown = dict(self._host.registered), dict(self._host.parameters)
+        if shown != self._shown:  # while nothing has changed, it is the same object as before, as in io/graph_client.py
+            self._shown, self._snapshot = shown, _snapshot(self._system, self._host)
+        self._known = shown[0]
         keys = {_key(process): process for process in self._known.values()}
         self._lives = {key: self._lives.get(key, Liveness()) for key in keys}
         return True
@@ -84,9 +95,7 @@ class MonitorPart:
         """The kernel closes the connection of a process that ends."""
         key = _key(process)
         if self.process.alive and not self.process.frozen and key in self._lives:
-            kernel, timing = self._host.kernel, Timing()
-            state = liveness.on_closed(self._lives[key], kernel.now, timing)
-            self._take(key, _next(state, process, kernel.now, timing))
+            self._take(key, _next(self._lives[key], process, self._host.kernel.now, Timing()))
 
     def _take(self, key: tuple[str, str], state: Liveness) -> None:
         before = self._lives.get(key, Liveness()).life
@@ -114,6 +123,8 @@ def _key(process: NodeProcess) -> tuple[str, str]:
 def _next(state: Liveness, process: NodeProcess, now: float, timing: Timing) -> Liveness:
     """Return the state of a connection after all that happens at once on it."""
     answers = process.alive and not process.hung
+    if state.connected and not process.alive:  # the kernel has closed it; a monitor that hung meanwhile sees it now
+        state = liveness.on_closed(state, now, timing)
     for _ in range(4):
         state, action = liveness.due(state, now, timing)
         if action is Action.CONNECT and not process.alive:

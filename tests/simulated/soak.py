@@ -10,10 +10,13 @@ from pathlib import Path
 import click
 from helpers.soaking import FOLDER, Arguments, FiguresError, code, hours, whole
 
+from simulated import systems
 from simulated.history import history, run
 from simulated.shrinking import as_test, shrink
 from simulated.tally import Tally
 
+CODE = ("catkin_ws/src", "tests/simulated", "tests/helpers", *systems.FOLDERS)
+"""What a history depends on: figures are of one state of it."""
 SAVE_PERIOD = 2.0  # s, wall, between two lines of progress
 
 
@@ -25,7 +28,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=whole("seed", 0), default=0, help="of the first history (default: 0)")
     parser.add_argument("--output", type=Path, default=FOLDER, help="folder (default: results/soak)")
     options = parser.parse_args(arguments)
-    tree = code("catkin_ws/src", "tests/simulated")
+    tree = code(*CODE)
     folder = options.output / f"simulated-{tree}-{options.seed}"
     try:
         state = folder / "state.json"

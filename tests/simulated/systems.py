@@ -143,3 +143,5 @@ _WHERE = {
     "d2": (TESTS.parent / "catkin_ws/src/metacontrol_sim/models", "/"),
 }
 NAMES = tuple(_WHERE)
+FOLDERS = tuple(str(folder.relative_to(TESTS.parent)) for folder, _ in _WHERE.values())
+"""Where the models are, relative to the project."""

@@ -82,7 +82,7 @@ class World:
         """Lift all that still goes on but what has broken for good."""
         self.host.behaviours.clear()
         self.host.broken_files.clear()
-        self.host.silent_until = 0.0
+        self.host.silent_until = min(self.host.silent_until, self.kernel.now)
         self._clock_goes()
         for process in self.host.living():
             if process.name not in self.system.base_nodes:

@@ -17,7 +17,7 @@ from simulated.manipulator import Settings as ManipulatorSettings
 from simulated.world import World
 
 TESTS = Path(__file__).parents[2]
-SEEDS = range(120)
+SEEDS = range(280)  # a million steps
 DIGESTS = "from simulated.history import history, run; print([run(history(seed)).digest for seed in range(12)])"
 
 

@@ -1,10 +1,30 @@
 """The command that runs histories for hours."""
 
+import itertools
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
 import pytest
+from helpers.soaking import ROOT
 from simulated import soak
 from simulated.tally import Tally, quantile
 
 SHORT = "0.0002"
+OPENED = """
+import os, sys
+opened = set()
+sys.addaudithook(lambda event, about: opened.add(about[0]) if event == "open" else None)
+sys.dont_write_bytecode = True
+from simulated import soak
+from simulated.history import History, run
+for name in soak.systems.NAMES:
+    run(History(1, name, ()))
+files = {getattr(module, "__file__", None) for module in sys.modules.values()} | opened
+print(*(os.path.realpath(file) for file in files if isinstance(file, str)), sep="\\n")
+"""
 
 
 def run(tmp_path, *arguments):
@@ -16,7 +36,9 @@ def state(tmp_path):
     return Tally.read(path)
 
 
-def test_second_run_goes_on_where_the_first_one_was(tmp_path, capsys):
+def test_second_run_goes_on_where_the_first_one_was(tmp_path, capsys, monkeypatch):
+    clock = itertools.count(step=0.5)  # each history takes 0.5 s, on a busy machine, too
+    monkeypatch.setattr(soak, "time", SimpleNamespace(monotonic=lambda: next(clock)))
     assert run(tmp_path, "--hours", SHORT, "--seed", "7") == 0
     first = state(tmp_path)
     assert run(tmp_path, "--hours", "0.0004", "--seed", "7") == 0
@@ -78,6 +100,15 @@ def test_state_of_another_form_is_refused_in_one_line(tmp_path, capsys):
         run(tmp_path, "--hours", "1")
     error = capsys.readouterr().err
     assert error.count("\n") == 1 and "delete it" in error
+
+
+def test_figures_are_of_all_files_that_a_history_needs():
+    environment = {**os.environ, "PYTHONPATH": f"{ROOT / 'tests'}:{os.environ['PYTHONPATH']}"}
+    done = subprocess.run([sys.executable, "-c", OPENED], env=environment, capture_output=True, check=True, text=True)
+    code, others = [ROOT / place for place in soak.CODE], [ROOT / ".venv", ROOT / "catkin_ws/devel"]
+    own = {file for file in map(Path, done.stdout.splitlines()) if file.is_file() and file.is_relative_to(ROOT)}
+    assert {ROOT / "tests/helpers/soaking.py", ROOT / "tests/simulated/orchard/metacontrol.yaml"} <= own
+    assert not {file for file in own if not any(file.is_relative_to(place) for place in (*code, *others))}
 
 
 def test_quantiles_are_times_that_were_seen():

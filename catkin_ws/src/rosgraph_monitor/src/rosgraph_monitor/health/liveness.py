@@ -13,6 +13,7 @@ from __future__ import annotations
 import enum
 import errno
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 
@@ -24,6 +25,21 @@ class Life(enum.Enum):
     DEAD = "dead: nobody answers at its address, though the master lists it"
     HUNG = "hung: its process accepts connections but leaves getPid unanswered"
     UNREACHABLE = "unreachable: its host does not answer, or its address leads nowhere"
+
+
+_WORKS = frozenset({Life.UNKNOWN, Life.ALIVE})
+
+
+def is_newer(polled: Mapping[tuple[str, str], Life], known: Mapping[tuple[str, str], Life]) -> bool:
+    """Tell whether a poll of the master is newer than what is known of the nodes that do not work.
+
+    One that began before a node died, and ended after that, says nothing of that: the node may unregister, or stay.
+
+    Args:
+        polled: what was known of each node, by name and address, when the master was asked.
+        known: what is known now.
+    """
+    return all(life in _WORKS or polled.get(node) is life for node, life in known.items())
 
 
 class Action(enum.Enum):

@@ -32,7 +32,7 @@ class PolledGraph:
     Attributes:
         snapshot: what the master lists.
         lives: what was known of each node before the master was asked: a node that was dead by then and is listed
-            has not unregistered.
+            has not unregistered (`liveness.is_newer`).
         duration: wall s that the master took.
         problem: what of the snapshot is older; empty if nothing is.
     """

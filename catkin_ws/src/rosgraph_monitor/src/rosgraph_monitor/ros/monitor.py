@@ -22,7 +22,7 @@ from ros_model.errors import ModelError
 
 from rosgraph_monitor.evaluation import GraphEvaluator
 from rosgraph_monitor.graph.desired import Grounding
-from rosgraph_monitor.health.liveness import Life
+from rosgraph_monitor.health.liveness import Life, is_newer
 from rosgraph_monitor.health.topics import merged, model_topics
 from rosgraph_monitor.io.graph_client import GraphClient
 from rosgraph_monitor.io.graph_poller import GraphPoller, PolledGraph
@@ -153,7 +153,9 @@ class MonitorNode:
         self._events.set()
 
     def _on_poll(self) -> None:
-        self._polled.set()
+        polled = self._poller.latest
+        if polled and is_newer(polled.lives, self._connections.lives()):
+            self._polled.set()
         self._events.set()
 
     def _wait(self) -> None:
@@ -175,8 +177,8 @@ class MonitorNode:
         return self._monitor.excused_topics(polled.snapshot, desired, self._topics.topics) if polled else frozenset()
 
     def _evaluate(self, polled: PolledGraph) -> list[Status]:
-        is_fresh = self._polled.is_set()
-        lives = polled.lives if is_fresh else self._connections.lives()
+        lives = self._connections.lives()
+        is_fresh = is_newer(polled.lives, lives)
         own = polled.snapshot.nodes.get(rospy.get_name())
         if own:
             lives[own.name, own.uri] = Life.ALIVE
