@@ -22,12 +22,12 @@ class DriftTest(StationTest):
         rospy.set_param(FORCE, 7)
         wait_for_equal(lambda: rospy.get_param(FORCE), 1, "the force is put back")
         wait_for(lambda: "EXECUTED" in self.states_of("grasper"), lambda: f"it is told: {self.decisions}")
-        self.assertIn(f"grasp_fine is deployed by parameters; put back: {FORCE} (7, not 1)", self.told)
+        self.wait_until_told(f"grasp_fine is deployed by parameters; put back: {FORCE} (7, not 1)")
 
         rospy.delete_param(SIDE)
         wait_for_equal(lambda: rospy.get_param(SIDE, None), "left", "the side is put back")
         wait_for(lambda: "EXECUTED" in self.states_of("looker"), lambda: f"it is told: {self.decisions}")
-        self.assertIn(f"look_left is deployed by parameters; put back: {SIDE} (not set, not left)", self.told)
+        self.wait_until_told(f"look_left is deployed by parameters; put back: {SIDE} (not set, not left)")
 
         ended = threading.Event()
         self.addCleanup(ended.set)
@@ -38,6 +38,10 @@ class DriftTest(StationTest):
         self.assertLessEqual(self.states_of("grasper").count("EXECUTED"), 3)
         self.wait_for_configurations()
         self.assertEqual(self.pids("f_assemble", "f_grasp", "f_look"), before)
+
+    def wait_until_told(self, text):
+        """Wait for words of the manipulator: they come on another topic than the decision."""
+        wait_for(lambda: text in self.told, lambda: f"the manipulator has told {self.told}")
 
     def states_of(self, node):
         """Return the states of the decisions on parameters of a node."""
