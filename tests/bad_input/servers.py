@@ -42,7 +42,14 @@ from metacontrol_msgs.srv import (
 from metacontrol_sim.srv import ContingencyRequest, IncreaseConsumptionFactorRequest
 from nav_msgs.srv import GetPlanRequest
 from sensor_msgs.msg import LaserScan
-from simulator_msgs.srv import DeleteObstacleRequest, SetLightRequest, SpawnObstacleRequest
+from simulator_msgs.srv import (
+    DeleteObstacle,
+    DeleteObstacleRequest,
+    SetLight,
+    SetLightRequest,
+    SpawnObstacle,
+    SpawnObstacleRequest,
+)
 from std_srvs.srv import EmptyRequest, TriggerRequest
 
 from bad_input.listeners import (
@@ -269,12 +276,7 @@ def _move_base(_ros: Ros) -> Callable[[], object]:
     node, settle = made_move_base()
     node._offer_the_rest()
     rospy.Subscriber("/scan", LaserScan, lambda _: settle())  # it has costmaps from then on
-
-    def tick() -> None:
-        settle()
-        node._take_parameters()
-
-    return tick
+    return settle
 
 
 def _move_base_asked() -> Good:
@@ -303,13 +305,9 @@ def _simulators(_ros: Ros) -> Callable[[], object]:
     robot._output = SimpleNamespace(tell_light=lambda: None)
     cell._obstacles, cell._light = {}, SimpleNamespace(publish=lambda _: None)
     for node in (robot, cell):
-        for name, kind, answer in (
-            ("spawn_obstacle", SpawnObstacleRequest, node._on_spawn),
-            ("delete_obstacle", DeleteObstacleRequest, node._on_delete),
-            ("set_light", SetLightRequest, node._on_set_light),
-        ):
-            service = SimpleNamespace(_request_class=kind, _response_class=_answer_of(kind))
-            rospy.Service(f"~{name}", service, answer)
+        rospy.Service("~spawn_obstacle", SpawnObstacle, node._on_spawn)
+        rospy.Service("~delete_obstacle", DeleteObstacle, node._on_delete)
+        rospy.Service("~set_light", SetLight, node._on_set_light)
 
     def clear() -> None:
         settle()
@@ -318,12 +316,6 @@ def _simulators(_ros: Ros) -> Callable[[], object]:
             node._on_set_light(SetLightRequest(1.0))
 
     return clear
-
-
-def _answer_of(request: Any) -> Any:
-    from simulator_msgs import srv
-
-    return getattr(srv, request.__name__.replace("Request", "Response"))
 
 
 def _simulators_good() -> Good:
