@@ -3,6 +3,8 @@
 import fcntl
 import os
 import socket
+import subprocess
+import sys
 
 import pytest
 from click.testing import CliRunner
@@ -73,3 +75,20 @@ def test_folder_in_which_another_run_is_at_work_is_refused_with_one_line(tmp_pat
     assert result.exit_code == 2
     assert result.output == f"metacontrol: --output: another run is at work in {tmp_path}: choose another folder\n"
     assert bag.exists()
+
+
+@pytest.mark.parametrize("command", ["run", "campaign", "bag", "report", "compare"])
+def test_command_imports_what_takes_long_when_it_needs_it(command):
+    code = (
+        "import sys; from metacontrol_experiments.cli.main import metacontrol; "
+        f"metacontrol([{command!r}, '--help'], standalone_mode=False); "
+        "print([name for name in ('aiohttp', 'dask', 'matplotlib', 'pybullet', 'scipy') if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_all_commands_are_told():
+    shown = CliRunner().invoke(metacontrol, ["--help"])
+    for name in ("bag", "calibrate", "campaign", "compare", "delays", "figure", "report", "run", "summary", "variants"):
+        assert f"\n  {name} " in shown.output

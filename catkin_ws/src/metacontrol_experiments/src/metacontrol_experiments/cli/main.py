@@ -2,30 +2,35 @@
 
 from __future__ import annotations
 
-import click
-from metacontrol_bags.cli.main import bag
-from metacontrol_dashboard.cli.view import view
+import importlib
 
-from metacontrol_experiments.cli.calibrate import calibrate
-from metacontrol_experiments.cli.campaign import campaign
-from metacontrol_experiments.cli.compare import compare
-from metacontrol_experiments.cli.delays import delays
-from metacontrol_experiments.cli.figure import figure
-from metacontrol_experiments.cli.report import report
-from metacontrol_experiments.cli.run import run
-from metacontrol_experiments.cli.summary import summary
-from metacontrol_experiments.cli.variants import variants
-from metacontrol_experiments.cli.yardstick import yardstick
+import click
+
 from metacontrol_experiments.io.display import CONSOLE
 
+_OWN = ("run", "summary", "figure", "calibrate", "variants", "compare", "delays", "campaign", "report", "yardstick")
+_MODULES = {name: f"metacontrol_experiments.cli.{name}" for name in _OWN} | {
+    "bag": "metacontrol_bags.cli.main",
+    "view": "metacontrol_dashboard.cli.view",
+}
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+
+class _Commands(click.Group):
+    """A group that imports a command when it is asked for: drawing and statistics take long to import."""
+
+    def list_commands(self, _context: click.Context) -> list[str]:
+        return sorted(_MODULES)
+
+    def get_command(self, _context: click.Context, name: str) -> click.Command | None:
+        if name not in _MODULES:
+            return None
+        command: click.Command = getattr(importlib.import_module(_MODULES[name]), name)
+        return command
+
+
+@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
 def metacontrol() -> None:
     """Missions of a robot that adapts, and what their bags tell."""
-
-
-for _command in (run, summary, figure, calibrate, variants, compare, delays, campaign, report, yardstick, bag, view):
-    metacontrol.add_command(_command)
 
 
 def main() -> None:

@@ -18,7 +18,6 @@ from metacontrol_experiments.campaign.yardstick import Target, Vibration, fit, l
 from metacontrol_experiments.io.display import CONSOLE, refusing, tell
 from metacontrol_experiments.io.ground_files import read_ground, routes_file
 from metacontrol_experiments.io.input_files import PackageError, route_names, simulation_package
-from metacontrol_experiments.io.report_files import read_published
 from metacontrol_experiments.io.yardstick_runs import TraceError, drive, read_trace, trace_file
 from metacontrol_experiments.managers.manager import NONE
 from metacontrol_experiments.mission.settings import DEFAULT_THRESHOLDS
@@ -99,6 +98,8 @@ def yardstick(seeds: int, jobs: int, fitting: bool, runs: Path, output: Path | N
 
 def _published() -> tuple[Any, Any, dict[str, float]]:
     """Return the published baseline in per cent, the published expected levels, and the limits."""
+    from metacontrol_experiments.io.report_files import read_published  # drawing takes a while to import
+
     baseline = {
         table: {row: 100.0 * told[NONE] for row, told in rows.items() if row.split()[0] in ("clutter", "power")}
         for table, rows in read_published().rows.items()

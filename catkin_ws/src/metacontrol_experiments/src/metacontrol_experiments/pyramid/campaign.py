@@ -19,7 +19,6 @@ from ros_model.project.schema_check import violations
 from metacontrol_experiments.campaign.matrix import CampaignError, check_count
 from metacontrol_experiments.managers.manager import MROS, NONE
 from metacontrol_experiments.pyramid.scenarios import MANIPULATION, TITLES, UNDISTURBED
-from metacontrol_experiments.report.statistics import rate
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -169,6 +168,8 @@ def read_summary(text: str, where: str) -> dict[str, Any]:
 
 def report(summaries: Mapping[PyramidRun, Mapping[str, Any]]) -> str:
     """Return the tables of a campaign in Markdown: success, duration and accuracy, and how fast it recovers."""
+    from metacontrol_experiments.report.statistics import rate  # scipy takes a while to import
+
     groups: dict[tuple[int, str, str], list[Mapping[str, Any]]] = {}
     for run, summary in sorted(summaries.items(), key=lambda item: _order(item[0])):
         groups.setdefault((run.scenario, run.configurations, run.manager), []).append(summary)
