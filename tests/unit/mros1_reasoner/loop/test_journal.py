@@ -150,14 +150,18 @@ def test_what_does_not_fit_is_refused(core):
         apply(core, Entry(1.0, Approve("x-1")))
 
 
+def as_it_is(entry):
+    return entry
+
+
 def test_long_journal_keeps_the_last_and_what_lasts():
-    journal = Journal(limit=100)
+    journal = Journal(as_it_is, limit=100)
     journal.append(Entry(0.0, ActiveFact("f_move", "scan_slow", "STABLE")))
     journal.append(Entry(0.0, ComponentFact("laser", "FALSE")))
     journal.append(Entry(0.5, ComponentFact("laser", "TRUE", 0.5)))
     journal.append(Entry(0.6, Lock()))
     for i in range(1000):
-        number = journal.append(Entry(1.0 + i, Step(heartbeat=False)))
+        number, _ = journal.append(Entry(1.0 + i, Step(heartbeat=False)))
     first, entries = journal.snapshot()
     assert number == 1003
     assert first + len(entries) == 1004
@@ -169,7 +173,7 @@ def test_long_journal_keeps_the_last_and_what_lasts():
 
 def kept(*entries, objectives=None, at_start=None, limit=4):
     """Return what a journal keeps of entries that are old ones, after a clock reset at each: their time goes back."""
-    journal = Journal(limit, at_start)
+    journal = Journal(as_it_is, limit, at_start)
     for i, content in enumerate(entries):
         journal.append(Entry(100.0 - i, content), objectives)
     for i in range(3 * limit):
@@ -223,7 +227,7 @@ def test_task_of_a_removed_objective_is_not_taken_for_that_of_another_one():
 
 
 def test_long_journal_stays_short_whatever_is_asked_for():
-    journal = Journal(limit=100, at_start={"o_a"})
+    journal = Journal(as_it_is, limit=100, at_start={"o_a"})
     objectives = {"o_a": replace(OBJECTIVE, name="o_a")}
     for i in range(1000):
         for content in (
@@ -240,7 +244,7 @@ def test_long_journal_stays_short_whatever_is_asked_for():
 def test_long_journal_that_keeps_much_does_not_look_at_it_with_each_entry(monkeypatch):
     compacted = []
     monkeypatch.setattr(Journal, "_compact", lambda self, old=Journal._compact: compacted.append(1) or old(self))
-    journal = Journal(limit=100)
+    journal = Journal(as_it_is, limit=100)
     for i in range(1000):
         journal.append(Entry(float(i), Lock(f"o_{i}")))
     assert len(compacted) <= 20
@@ -248,7 +252,7 @@ def test_long_journal_that_keeps_much_does_not_look_at_it_with_each_entry(monkey
 
 @given(st.lists(st.sampled_from([content for _, _, content in WRITTEN]), max_size=30), st.integers(0, 30))
 def test_journal_that_is_short_enough_has_every_entry(contents, more):
-    journal = Journal(limit=60)
+    journal = Journal(as_it_is, limit=60)
     entries = [Entry(float(i), content) for i, content in enumerate([*contents, *[Step(heartbeat=True)] * more])]
     for entry in entries:
         journal.append(entry, {})

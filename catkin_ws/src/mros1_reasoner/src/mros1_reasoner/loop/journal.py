@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
+from typing import Generic, TypeVar
 
 from metacontrol_bags.decision import DECIDED, PROPOSED, Decision
 
@@ -12,6 +13,9 @@ from mros1_reasoner.knowledge.model import Objective
 from mros1_reasoner.loop import entries
 from mros1_reasoner.loop.entries import Entry
 from mros1_reasoner.loop.mape import Mape
+
+Form = TypeVar("Form")
+"""What a journal keeps of an entry: the entry, or what a message has of it."""
 
 _LASTING = entries.ActiveFact | entries.ComponentFact | entries.BindingFact | entries.TaskFact | entries.BeforeFact
 _COMMANDS = (
@@ -72,49 +76,57 @@ def brought(now: float, decisions: Sequence[Decision]) -> list[Entry]:
     ]
 
 
-class Journal:
+class Journal(Generic[Form]):
     """The last entries, numbered from the reasoner's start, and older entries that still hold."""
 
-    def __init__(self, limit: int = 50_000, at_start: Collection[str] | None = None) -> None:
+    def __init__(
+        self, form: Callable[[Entry], Form], limit: int = 50_000, at_start: Collection[str] | None = None
+    ) -> None:
         """Begin without entries.
 
         Args:
+            form: makes of an entry what is kept of it and returned; the smaller it is, the less memory it takes.
             limit: how many of the last entries are kept: 50,000 are some 20 minutes' worth on a busy robot.
             at_start: names of the objectives that are asked for from the start: to remove another one needs not be
                 kept when what has asked for it is not; None: any may be one of these.
         """
+        self._form = form
         self._limit = limit
         self._at_start = at_start
-        self._last: deque[tuple[Entry, tuple[entries.Content, ...]]] = deque()  # with what of each is to be kept later
+        self._last: deque[Form] = deque()
+        self._lasting: deque[tuple[int, Entry]] = deque()  # what of these is to be kept later, with their numbers
         self._kept: dict[tuple[str, ...], tuple[int, Entry]] = {}  # older ones with their numbers, by their subjects
         self._count = 0
 
-    def append(self, entry: Entry, objectives: Mapping[str, Objective] | None = None) -> int:
-        """Add an entry; return its number.
+    def append(self, entry: Entry, objectives: Mapping[str, Objective] | None = None) -> tuple[int, Form]:
+        """Add an entry; return its number, and what is kept of it.
 
         Args:
             entry: it.
             objectives: those that there are, by name: an older command for all of them is kept as one for each.
         """
-        self._last.append((entry, _lasting(entry.content, objectives)))
+        formed = self._form(entry)
+        self._last.append(formed)
+        for content in _lasting(entry.content, objectives):
+            self._lasting.append((self._count, replace(entry, content=content)))
         self._count += 1
         if len(self._last) > self._limit:
             self._compact()
-        return self._count - 1
+        return self._count - 1, formed
 
-    def snapshot(self) -> tuple[int, list[Entry]]:
-        """Return the entries, and the number that the first one would have if there were no gaps."""
-        kept = [entry for _, entry in sorted(self._kept.values(), key=lambda item: item[0])]
-        found = [*kept, *(entry for entry, _ in self._last)]
+    def snapshot(self) -> tuple[int, list[Form]]:
+        """Return what is kept of the entries, and the number that the first one would have if there were no gaps."""
+        kept = [self._form(entry) for _, entry in sorted(self._kept.values(), key=lambda item: item[0])]
+        found = [*kept, *self._last]
         return self._count - len(found), found
 
     def _compact(self) -> None:
         """Drop the older half of the last entries, except what holds: of each subject, the last one."""
+        for _ in range(len(self._last) // 2):
+            self._last.popleft()
         first = self._count - len(self._last)
-        for number in range(first, first + len(self._last) // 2):
-            entry, lasting = self._last.popleft()
-            for content in lasting:
-                self._keep(number, replace(entry, content=content))
+        while self._lasting and self._lasting[0][0] < first:
+            self._keep(*self._lasting.popleft())
 
     def _keep(self, number: int, entry: Entry) -> None:
         """Keep an older entry, in place of those that it makes void."""
