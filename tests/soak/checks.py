@@ -153,11 +153,12 @@ def keeps_the_speed(mission: Mission, observed: Observed) -> Iterator[str]:
 
 
 def stays_small(mission: Mission, observed: Observed) -> Iterator[str]:
-    """Memory and descriptors of each process stay flat."""
+    """Memory and descriptors of each process stay flat, until the mission has ended: figures are drawn then."""
     lives: dict[tuple[int, str], list[Usage]] = defaultdict(list)
+    start, over = observed.event("MISSION_START"), observed.event("MISSION_END")
     for usage in observed.usages:
-        lives[usage.pid, usage.role].append(usage)
-    start = observed.event("MISSION_START")
+        if over is None or usage.t <= over.t:
+            lives[usage.pid, usage.role].append(usage)
     for (_, role), life in lives.items():
         begin, end = life[0].t, life[-1].t
         settled = SETTLED_S * observed.stretch(begin, begin + SETTLED_S)

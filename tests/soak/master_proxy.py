@@ -1,7 +1,8 @@
 """Stands before a ROS master: `python -m soak.master_proxy REAL_PORT FILE --core -p PORT ...`, as rosmaster is called.
 
-It passes bytes on. FILE says how: `slow S` delays each connection's answers by S s, `refuse` refuses connections and
-breaks those that are open, anything else lets all pass. It starts the real master, and ends with it.
+It passes bytes on. FILE says how: `slow S` delays each connection's answers by S s, `break` breaks all connections as
+soon as they are made, `refuse` refuses them and breaks those that are open, anything else lets all pass. It starts the
+real master, and ends with it.
 """
 
 from __future__ import annotations
@@ -59,12 +60,14 @@ class Proxy:
         """Take connections for ever."""
         listening: socket.socket | None = None
         while True:
-            if self._mode()[0] == "refuse":
+            mode = self._mode()[0]
+            if mode in ("break", "refuse"):
+                for one in list(self._open):
+                    _close(one)
+            if mode == "refuse":
                 if listening is not None:
                     listening.close()
                     listening = None
-                for one in list(self._open):
-                    _close(one)
                 time.sleep(_POLL_S)
                 continue
             if listening is None:
@@ -73,6 +76,9 @@ class Proxy:
             try:
                 client, _ = listening.accept()
             except TimeoutError:
+                continue
+            if mode == "break":
+                _close(client)
                 continue
             client.settimeout(None)
             threading.Thread(target=self._pass, args=(client,), daemon=True).start()

@@ -35,8 +35,8 @@ SAYS = "met: "
 HALVES = (b"", b"POST /RPC2 HTTP/1.1\r\nContent-Length: 900\r\n\r\n<?xml", b"\xff\x00\x00")
 """What half-open connections have said."""
 _PHASE_S = 10.0
-_BREAK_S = 0.08
-"""Less than the time after which a second refusal tells that the master is gone."""
+_BREAK_S = 0.3
+"""For so long no connection to the master holds. None is refused: two refusals tell that it is gone."""
 _BALLAST, _BLOCK = "ballast", 65536
 
 
@@ -202,8 +202,9 @@ class Striker:
         return said, lambda: _end(process)
 
     def proxy(self, fault: Fault) -> tuple[str, Undo | None]:
-        """Have the proxy delay or refuse."""
-        mode = f"slow {0.3 + fault.pick:.2f}" if fault.kind is Kind.SLOW_MASTER else "refuse"
+        """Have the proxy delay, break or refuse."""
+        modes = {Kind.SLOW_MASTER: f"slow {0.3 + fault.pick:.2f}", Kind.BREAKING_MASTER: "break"}
+        mode = modes.get(fault.kind, "refuse")
         self.place.control.write_text(mode)
         if fault.kind is Kind.BREAKING_MASTER:
             time.sleep(_BREAK_S)

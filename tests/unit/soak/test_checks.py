@@ -177,6 +177,13 @@ def test_part_that_grows_is_told(grown):
     assert names(observed) == {"memory and descriptors stay flat"}
 
 
+def test_what_draws_figures_when_the_mission_is_over_is_flat():
+    observed = calm()
+    observed.events[-1] = observed.events[-1]._replace(t=40.0)
+    observed.usages = [one._replace(memory=70.0 if one.t <= 40.0 else 120.0) for one in observed.usages]
+    assert names(observed) == set()
+
+
 def test_part_that_grows_at_its_start_only_is_flat():
     observed = calm()
     observed.usages = [one._replace(memory=20.0 if one.t < 10.0 else 70.0) for one in observed.usages]
