@@ -5,6 +5,8 @@ to a driver that it has not seen alive, and tells of it only where the master an
 
 Nothing else does. The monitor knows of the other drivers by its own connections, also while the master is silent. Its
 clock goes on evenly where others stand or jump. Drivers belong to no function, so no change of one excuses them.
+
+What is told of a driver is not taken back before it works again.
 """
 
 from __future__ import annotations
@@ -40,6 +42,7 @@ class Alarms:
         self._monitor: MonitorPart | None = None
         self._began = math.inf  # when the present monitor knew the graph
         self._seen: set[str] = set()  # drivers that it must have seen alive
+        self._told: tuple[MonitorPart | None, frozenset[str]] = None, frozenset()  # which drivers are missing, by whom
 
     def missing(self) -> Iterator[str]:
         """Yield which drivers do not work, and should have been told by now."""
@@ -67,6 +70,20 @@ class Alarms:
             if now >= due and (untold := self._untold(monitor, name)):
                 how = "hangs" if hangs else "is dead"
                 yield f"driver {node} {how} since {since:.2f}, and the monitor does not tell: {untold}"
+
+    def withdrawn(self) -> Iterator[str]:
+        """Yield which drivers are told no more to be missing, though they have not worked lately."""
+        now, monitor = self._world.kernel.now, self._world.monitor
+        names = {status.name for status in monitor.told if status.message == Words.MISSING_NODE} if monitor else set()
+        missing = frozenset(node for node, name in self._drivers.items() if name in names)
+        (before, earlier), self._told = self._told, (monitor, missing)
+        if monitor is None or monitor is not before or now - monitor.process.awake_since < DEAD:
+            return
+        for node in sorted(earlier - missing):
+            process = self._world.host.registered.get(node)
+            worked = now if process and process.answers else process.since if process else 0.0
+            if now - worked >= DEAD:
+                yield f"driver {node} does not work since {worked:.2f}, and is told no more to be missing"
 
     def _untold(self, monitor: MonitorPart, name: str) -> str:
         """Return what the monitor should have published last of a driver that does not work, and has not."""

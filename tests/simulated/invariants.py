@@ -33,6 +33,7 @@ class Invariants:
             self._next_look = world.kernel.now + 0.05
             self._see_roles()
             world.broken += self._alarms.missing()
+            world.broken += self._alarms.withdrawn()
             if self.is_quiet():
                 world.broken += list(disagreements(world))
 

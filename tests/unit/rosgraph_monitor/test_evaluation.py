@@ -88,9 +88,39 @@ def test_restarted_node_has_another_address_and_recovers_when_it_answers():
     again = GraphSnapshot(nodes=BOTH.nodes | {LASER: NodeState(LASER, "http://host/again")})
     waiting = said(watched.evaluate(again, ALIVE, DESIRED, 0.2))
     assert ("laser_resender", "Component status", "FALSE") in waiting
+    assert ("front_laser", "Missing node", Life.DEAD.value) in waiting
     back = ALIVE | {(LASER, "http://host/again"): Life.ALIVE}
     assert ("laser_resender", "Component status", "RECOVERED") in said(watched.evaluate(again, back, DESIRED, 0.3))
     assert ("laser_resender", "Component status", "TRUE") in said(watched.evaluate(again, back, DESIRED, 9.0))
+
+
+@pytest.mark.parametrize(
+    ("before", "reason"),
+    [
+        (ALIVE | lives(front_laser=Life.DEAD), Life.DEAD.value),
+        (ALIVE | lives(front_laser=Life.HUNG), Life.HUNG.value),
+        (None, "ended: it has unregistered from the master"),
+    ],
+)
+def test_node_that_dies_again_before_it_answers_is_missing_all_the_time(before, reason):
+    watched = monitor()
+    watched.evaluate(BOTH, ALIVE, DESIRED, 0.0)
+    gone = (BOTH, before) if before else (graph("/move_base"), ALIVE)
+    told = [watched.evaluate(*gone, DESIRED, 0.1)]
+    again = GraphSnapshot(nodes=BOTH.nodes | {LASER: NodeState(LASER, "http://host/again")})
+    told += [watched.evaluate(again, ALIVE, DESIRED, now) for now in (0.2, 0.3)]
+    assert all(("front_laser", "Missing node", reason) in said(statuses) for statuses in told)
+    dead = ALIVE | {(LASER, "http://host/again"): Life.DEAD}
+    assert ("front_laser", "Missing node", Life.DEAD.value) in said(watched.evaluate(again, dead, DESIRED, 0.4))
+    hears = ALIVE | {(LASER, "http://host/again"): Life.ALIVE}
+    assert ("ROS Graph", "running OK", "") in said(watched.evaluate(again, hears, DESIRED, 0.5))
+
+
+def test_node_that_was_never_missing_works_until_it_is_known_not_to():
+    watched = monitor()
+    watched.evaluate(BOTH, ALIVE, DESIRED, 0.0)
+    again = GraphSnapshot(nodes=BOTH.nodes | {LASER: NodeState(LASER, "http://host/again")})
+    assert ("ROS Graph", "running OK", "") in said(watched.evaluate(again, ALIVE, DESIRED, 0.1))
 
 
 def test_excused_nodes_raise_no_alarm():

@@ -123,3 +123,21 @@ def test_monitor_that_begins_with_the_system_has_longer(mute):
 
 def test_monitor_that_hung_tells_at_once_what_died_meanwhile():
     assert not broken(Fault(10.0, Kind.FREEZE_PART, "monitor", 12.0), KILLED)
+
+
+def test_monitor_that_takes_back_what_it_told_is_found(monkeypatch):
+    tell(monkeypatch, lambda status: forgets and status.message == Words.MISSING_NODE)
+    world = World(systems.load("greenhouse"), 3, ManipulatorSettings(), LoopSettings(), Counter())
+    alarms, forgets = Alarms(world), []
+    world.kernel.at(20.0, lambda: world.strike(KILLED))
+    world.kernel.run(25.0)
+    assert not list(alarms.withdrawn())
+    forgets.append(True)
+    world.kernel.run(26.0)
+    assert f"{VALVE} does not work since 20.00, and is told no more to be missing" in "; ".join(alarms.withdrawn())
+    assert not list(alarms.withdrawn())
+    world.close()
+
+
+def test_what_is_told_of_a_driver_that_works_again_may_be_taken_back():
+    assert not broken(Fault(20.0, Kind.KILL_DRIVER, VALVE, 3.0))

@@ -166,3 +166,12 @@ def test_manipulator_that_begins_while_the_launcher_hangs_ends_no_node():
         Fault(22.0, Kind.KILL_PART, "manipulator"),
     )
     holds(History(1, "d2", faults, Policy.WAIT))
+
+
+def test_driver_that_dies_again_while_the_master_is_silent_stays_told_as_missing():
+    faults = (
+        Fault(6.092, Kind.KILL_DRIVER, "/fleet/r7/receiver", 16.74),
+        Fault(23.217, Kind.MASTER_SILENT, "", 3.758),
+        Fault(25.909, Kind.KILL_DRIVER, "/fleet/r7/receiver"),
+    )
+    holds(History(310019903, "orchard", faults, Policy.REPLACE, starts_with_initial=True))

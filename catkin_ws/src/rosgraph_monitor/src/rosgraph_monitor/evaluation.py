@@ -87,6 +87,7 @@ class GraphEvaluator:
         self._tracker = ComponentTracker(component_of, patience.startup, patience.recovery)
         self._settling = Settling(patience.startup, patience.ports)
         self._gone: dict[str, tuple[str, str]] = {}  # how each node that is missing has gone
+        self._missing: dict[str, tuple[str, str]] = {}  # the same of the nodes that were told to be missing last
         self._publisher: dict[str, str] = {}
         self._reasons: dict[str, str] = {}  # why each component that has failed has done so
         self._last: tuple[tuple[Any, ...], Look] | None = None
@@ -147,7 +148,8 @@ class GraphEvaluator:
         statuses = component_statuses(components, self._reasons)
         troubles = [f"desired model: {desired.problem}"] * bool(desired.problem) + [problem] * bool(problem)
         statuses.extend(map(graph_problem, troubles))
-        findings = self._findings(snapshot, dead, desired, now, is_fresh)
+        unheard = {name: node for name, node in running.items() if life[node] is Life.UNKNOWN}
+        findings = self._findings(snapshot, dead | self._still_missing(unheard), desired, now, is_fresh)
         problems = [*finding_statuses(findings, desired.configurations_of), *verdict_statuses(topics)]
         statuses.extend(problems)
         if desired.system is not None and not problems and not troubles:
@@ -188,7 +190,16 @@ class GraphEvaluator:
             return [*wrong_topic_types(snapshot, self._scope.topic_types, self._scope.namespace)]
         excused = desired.excused | self._tracker.waited_for
         look = self._look(snapshot, desired.system, dead, excused, desired.idle_nodes)
-        return [self._worded(finding, is_fresh) for finding in self._settling.told(look, now)]
+        findings = [self._worded(finding, is_fresh) for finding in self._settling.told(look, now)]
+        self._missing = {one.node: (one.state, one.reason) for one in findings if isinstance(one, MissingNode)}
+        return findings
+
+    def _still_missing(self, unheard: Mapping[str, str]) -> dict[str, tuple[str, str]]:
+        """Return how nodes have gone in whose place others are registered that were not heard yet: they may die, too.
+
+        `unheard` has the nodes that were not heard by the names of those that are expected.
+        """
+        return {node: self._missing[name] for name, node in unheard.items() if name in self._missing}
 
     def _look(
         self,
