@@ -15,7 +15,7 @@ from rosgraph_monitor.evaluation import GraphEvaluator, Patience
 from rosgraph_monitor.graph.comparison import Scope
 from rosgraph_monitor.graph.desired import DesiredModel, Grounding
 from rosgraph_monitor.health import liveness
-from rosgraph_monitor.health.liveness import Action, Life, Liveness, Timing
+from rosgraph_monitor.health.liveness import Action, Liveness, Timing
 
 from simulated.host import Host, NodeProcess
 from simulated.kernel import Inbox, Process
@@ -100,7 +100,7 @@ class MonitorPart:
     def _take(self, key: tuple[str, str], state: Liveness) -> None:
         before = self._lives.get(key, Liveness()).life
         self._lives[key] = state
-        if state.life is not before and Life.UNKNOWN is not before:
+        if state.life is not before:
             self._inbox.put()
 
     def _follow(self, active: Iterable[Any]) -> None:

@@ -175,3 +175,8 @@ def test_driver_that_dies_again_while_the_master_is_silent_stays_told_as_missing
         Fault(25.909, Kind.KILL_DRIVER, "/fleet/r7/receiver"),
     )
     holds(History(310019903, "orchard", faults, Policy.REPLACE, starts_with_initial=True))
+
+
+def test_driver_that_dies_a_second_after_it_has_come_is_told():
+    faults = (Fault(1.801, Kind.KILL_DRIVER, "/front_laser"),)
+    holds(History(330008750, "d2", faults, Policy.REPLACE))
