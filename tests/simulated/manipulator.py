@@ -22,6 +22,7 @@ from rosgraph_manipulator.change.requests import Requests
 from rosgraph_manipulator.change.tactics import NoRunningNodes, nothing, parameters, replace, restart
 from rosgraph_manipulator.configuration.configurations import Configuration
 from rosgraph_manipulator.hosts.merging import merged, stale
+from rosgraph_manipulator.hosts.reported import Reported
 from rosgraph_manipulator.io.launch_files import LaunchFile
 
 from simulated.host import Host
@@ -92,7 +93,8 @@ class ManipulatorPart:
 
     def _take_reports(self, reports: tuple[LauncherReport, ...]) -> None:
         self.heard = reports
-        self._launchers.heard = {report.function: report for report in reports}
+        told = {report.function: report for report in reports}
+        self._launchers.told.take(told, self._topics["functions"].delivers)
         self.process.call(self._launchers.on_reports)
 
     def _run(self) -> None:
@@ -346,15 +348,16 @@ class _Launchers:
         self._part, self._present = part, present
         self.on_reports: Callable[[], object] = lambda: None
         self.losses = 0
-        self.heard: dict[str, LauncherReport] = {}
+        self.told = Reported()
         self._parts: dict[str, frozenset[str]] = {}
 
     def reports(self) -> dict[str, LauncherReport]:
-        functions = sorted({*self.heard, *self._parts})
+        functions = sorted({*self.told.functions, *self._parts})
         return {name: merged(name, self._of(name), self._parts.get(name), {}) for name in functions}
 
     def _of(self, function: str) -> dict[str, LauncherReport]:
-        return {LAUNCHER: self.heard[function]} if function in self.heard else {}
+        report = self.told.report(function)
+        return {} if report is None else {LAUNCHER: report}
 
     def lost_hosts(self, function: str) -> list[str]:
         return []
@@ -415,7 +418,7 @@ class _Launchers:
         return names
 
     def stop_rest(self, function: str) -> None:
-        report = self.heard.get(function)
+        report = self.told.report(function)
         if report and report.configuration and report.nodes and report.state != FAILED:
             self._release(function)
 
@@ -432,12 +435,13 @@ class _Launchers:
             found()
             launcher = self._present()
             process.pause(kernel.uniform(0.001, 0.01))
-            attempt = replace_fields(call)
+            attempt, connection = replace_fields(call), self.told.connection
             if launcher is not None and launcher.process.alive:
                 self._wait_for_answer(launcher, attempt)
             if attempt.done and attempt.error:
                 raise DeploymentError(attempt.error)
             if attempt.done:
+                self.told.answer(call.function, attempt.number, connection)
                 return attempt
             if kernel.now > deadline:
                 raise DeploymentError(f"{LAUNCHER} has failed: check that it runs")

@@ -46,6 +46,7 @@ class Topic:
         self._publishers: dict[Process, Any] = {}  # with the last message
         self._subscribers: list[_Subscriber] = []
         self._connections = itertools.count()
+        self.delivers = -1  # number of the connection whose message is being delivered
         self.slow_until = 0.0
         self.slowness = 0.0
 
@@ -122,4 +123,5 @@ class Topic:
             message = connection.waiting.popleft()
             is_late = self._latched and subscriber.succession.is_late(connection.publisher.name, connection.number)
             if subscriber.process.alive and not is_late:
+                self.delivers = connection.number
                 subscriber.take(message)

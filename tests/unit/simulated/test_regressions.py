@@ -180,3 +180,16 @@ def test_driver_that_dies_again_while_the_master_is_silent_stays_told_as_missing
 def test_driver_that_dies_a_second_after_it_has_come_is_told():
     faults = (Fault(1.801, Kind.KILL_DRIVER, "/front_laser"),)
     holds(History(330008750, "d2", faults, Policy.REPLACE))
+
+
+def test_death_that_is_reported_after_the_next_change_does_not_fail_what_runs_since():
+    faults = (
+        Fault(4.23, Kind.DIES_LATER, "/waterer", 2.458),
+        Fault(7.775, Kind.FREEZE_NODE, "/waterer"),
+        Fault(8.645, Kind.DISMISS_PART, "manipulator"),
+        Fault(41.497, Kind.LOCK, "o_water", 2.514),
+        Fault(41.827, Kind.KILL_NODE, "/waterer"),
+        Fault(45.462, Kind.FREEZE_NODE, "/waterer", 12.428),
+        Fault(56.681, Kind.SLOW, "functions", 4.713),
+    )
+    holds(History(350012747, "greenhouse", faults, Policy.REPLACE, starts_with_initial=True))

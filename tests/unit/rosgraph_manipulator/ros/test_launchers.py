@@ -102,9 +102,9 @@ def followed(around):
     return Launchers(timeout=0.1, host_timeout=0.0)
 
 
-def tell(followed, who, change=3, nodes=("/nav",), configuration="slow", header=None):
+def tell(followed, who, change=3, nodes=("/nav",), configuration="slow", header=None, state="STABLE"):
     """Have a launcher tell what it has; without the header of a connection, over a new one."""
-    report = LaunchedFunction("f", configuration, change, "STABLE", list(nodes), [], "")
+    report = LaunchedFunction("f", configuration, change, state, list(nodes), [], "")
     message = LaunchedFunctions(functions=[report])
     message._connection_header = header or {"callerid": who}
     followed._take(message)
@@ -318,3 +318,28 @@ def test_launcher_that_can_not_be_asked_for_want_of_a_thread_is_asked_again(foll
     no_thread()
     assert followed.find()
     assert asked == [MAIN]
+
+
+def test_report_of_before_a_change_that_was_answered_says_nothing_of_what_runs_now(followed, around):
+    header = {"callerid": MAIN}
+    tell(followed, MAIN, header=header)
+    assert ask(followed, NODE).number == 4
+    tell(followed, MAIN, state="FAILED", header=header)
+    assert followed.reports()["f"].state == "CHANGING"
+    tell(followed, MAIN, change=4, configuration="fast", header=header)
+    assert (followed.reports()["f"].state, followed.reports()["f"].configuration) == ("STABLE", "fast")
+
+
+def test_report_of_a_launcher_that_has_started_anew_counts_though_its_numbers_are_lower(followed, around):
+    tell(followed, MAIN)
+    ask(followed, NODE)
+    tell(followed, MAIN, change=1, state="FAILED")
+    assert followed.reports()["f"].state == "FAILED"
+
+
+def test_change_that_a_launcher_refuses_is_not_waited_for(followed, around):
+    tell(followed, MAIN)
+    around.change = lambda: ChangeNodesResponse(ok=False, message="no", change=4)
+    with pytest.raises(DeploymentError, match="no"):
+        ask(followed, NODE)
+    assert followed.reports()["f"].state == "STABLE"

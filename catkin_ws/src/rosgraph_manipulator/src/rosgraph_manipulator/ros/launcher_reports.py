@@ -25,6 +25,7 @@ from rosgraph_launcher.launching.report import LauncherReport
 from rosgraph_launcher.ros.node_messages import report_from
 
 from rosgraph_manipulator.hosts.merging import merged
+from rosgraph_manipulator.hosts.reported import Reported
 from rosgraph_manipulator.io.master import get_parameters, publishers
 
 TOPIC = "rosgraph_launcher/functions"
@@ -41,23 +42,21 @@ class _Known:
     Attributes:
         place: its name and its host.
         is_here: whether it runs on this host.
-        reports: what it tells, by function.
+        told: what it has told of its functions.
         answered: when it was heard last, monotonic wall s.
         pid: of its process, as it says itself; None: nobody has asked.
         uri: address of its API; None: unknown.
         lost: whether its host is lost.
-        connection: header of the connection over which it reports; None: it has not reported yet.
         is_read: whether place and host are those of the process that runs now.
     """
 
     place: HostLauncher
     is_here: bool
-    reports: dict[str, LauncherReport] = field(default_factory=dict)
+    told: Reported = field(default_factory=Reported)
     answered: float = field(default_factory=time.monotonic)
     pid: int | None = None
     uri: str | None = None
     lost: bool = False
-    connection: object = None
     is_read: bool = False
 
 
@@ -115,7 +114,7 @@ class LauncherReports:
     def reports(self) -> dict[str, LauncherReport]:
         """Return what all launchers tell together, by function."""
         with self._lock:
-            functions = {name for known in self._known.values() for name in known.reports} | set(self._parts)
+            functions = {name for known in self._known.values() for name in known.told.functions} | set(self._parts)
             lost = {name: self._line(known) for name, known in self._known.items() if known.lost}
             return {name: merged(name, self._of(name), self._parts.get(name), lost) for name in sorted(functions)}
 
@@ -193,10 +192,9 @@ class LauncherReports:
             known = self._known.get(name) or self._strangers.get(name)
             if known is None:
                 known = self._strangers[name] = _Known(HostLauncher(name), is_here=True)
-            is_new = known.connection is not connection  # it may be another process, on another host
-            if is_new:
-                known.connection, known.uri, known.is_read = connection, None, False
-            known.reports = reports
+            is_new = known.told.take(reports, connection)
+            if is_new:  # it may be another process, on another host
+                known.uri, known.is_read = None, False
             self._heard(known)
         if is_new:
             self._read(name)
@@ -233,7 +231,8 @@ class LauncherReports:
             rospy.logwarn("host %s is back", known.place.host)
 
     def _line(self, known: _Known) -> str:
-        nodes = ", ".join(sorted({node for report in known.reports.values() for node in report.nodes}))
+        reports = [known.told.report(function) for function in known.told.functions]
+        nodes = ", ".join(sorted({node for report in reports if report for node in report.nodes}))
         silence = f"{known.place.name} has not answered for {self._host_timeout:g} s{nodes and f', and ran {nodes}'}"
         if known.is_here:
             return f"{silence}: start it again"
@@ -244,7 +243,8 @@ class LauncherReports:
             return f"host {self._known[name].place.host}" if name in self._known else name
 
     def _of(self, function: str) -> dict[str, LauncherReport]:
-        return {name: k.reports[function] for name, k in self._known.items() if function in k.reports}
+        told = {name: known.told.report(function) for name, known in self._known.items()}
+        return {name: report for name, report in told.items() if report is not None}
 
     def _watch(self) -> None:
         while not rospy.is_shutdown():
@@ -287,7 +287,7 @@ class LauncherReports:
                 if known.pid not in (None, pid):  # it is another process
                     known.is_read = False
                     if was_lost:
-                        known.reports = {}  # it tells what it has as soon as it is connected
+                        known.told.forget()  # it tells what it has as soon as it is connected
                 known.pid = pid
                 self._heard(known)
             elif time.monotonic() - known.answered > self._host_timeout:

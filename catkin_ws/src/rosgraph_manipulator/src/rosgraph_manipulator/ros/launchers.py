@@ -262,12 +262,19 @@ class Launchers(LauncherReports):
         while True:
             service.wait_for_service(max(deadline - time.monotonic(), REPEAT_PERIOD))
             found()
+            with self._lock:
+                connection = self._known[name].told.connection if name in self._known else None
             try:
-                return self._answer(name, service, request)
+                answer = self._answer(name, service, request)
             except (rospy.ServiceException, TransportException, OSError) as error:
                 if time.monotonic() > deadline or not self._is_undone(error, name, service.uri):
                     raise
                 time.sleep(REPEAT_PERIOD)
+                continue
+            with self._lock:
+                if answer.ok and name in self._known:  # a change that is refused at once is not reported
+                    self._known[name].told.answer(request.function, answer.change, connection)
+            return answer
 
     def _answer(self, name: str, service: rospy.ServiceProxy, request: ChangeNodesRequest) -> ChangeNodesResponse:
         """Return a launcher's answer to a request; a change may take long, but the launcher lives meanwhile.
