@@ -88,8 +88,8 @@ class ManipulatorPart:
 
     @property
     def is_idle(self) -> bool:
-        """Whether it serves, and nothing waits or is under way."""
-        return self.serves and not self.busy and not self._inbox
+        """Whether it serves, and nothing waits or is under way, nor a report of the launcher."""
+        return self.serves and not self.busy and not self._inbox and not self._topics["functions"].brings(self.process)
 
     def _take_reports(self, reports: tuple[LauncherReport, ...]) -> None:
         self.heard = reports

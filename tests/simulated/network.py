@@ -88,6 +88,11 @@ class Topic:
         """Tell whether a process hears another one."""
         return any(s.process is subscriber and id(publisher) in s.connections for s in self._subscribers)
 
+    def brings(self, subscriber: Process) -> bool:
+        """Tell whether a message is on its way to a process."""
+        heard = [known for known in self._subscribers if known.process is subscriber]
+        return any(connection.waiting for known in heard for connection in known.connections.values())
+
     def _connect(self, publisher: Process, subscriber: _Subscriber) -> None:
         def connected() -> None:
             if not (publisher.alive and subscriber.process.alive):

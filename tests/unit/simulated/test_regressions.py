@@ -193,3 +193,12 @@ def test_death_that_is_reported_after_the_next_change_does_not_fail_what_runs_si
         Fault(56.681, Kind.SLOW, "functions", 4.713),
     )
     holds(History(350012747, "greenhouse", faults, Policy.REPLACE, starts_with_initial=True))
+
+
+def test_connection_that_is_made_anew_while_a_node_recovers_brings_the_report_late():
+    faults = (
+        Fault(56.173, Kind.KILL_NODE, "/fleet/r7/mast"),
+        Fault(56.531, Kind.SLOW, "functions", 3.739),
+        Fault(56.934, Kind.RECONNECT, "functions"),
+    )
+    holds(History(370000150, "orchard", faults, Policy.WAIT))
