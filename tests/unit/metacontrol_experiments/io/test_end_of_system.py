@@ -86,3 +86,34 @@ def test_lost_master_is_told_where_the_console_can_not_be_read(tmp_path):
     with watched_master(tmp_path / "no.log") as (uri, end, lose):
         lose()
         assert end.cause() == f"ROS master {uri} is gone"
+
+
+def test_end_has_begun_once_roslaunch_ends_its_processes(tmp_path):
+    console = tmp_path / "console.log"
+    end = EndOfSystem(console, "http://localhost:1")
+    assert not end.has_begun()  # there is no console yet
+    with console.open("w") as written:
+        for text, has_begun in [
+            ("process[world-2]: started\n", False),
+            ("[world-2] killing ", False),
+            ("on exit\n", True),
+        ]:
+            written.write(text)
+            written.flush()
+            assert end.has_begun() == has_begun
+        written.write("[master] killing on exit\n")
+    assert end.has_begun()
+
+
+def test_end_has_begun_once_the_master_is_gone(tmp_path):
+    with watched_master(tmp_path / "no.log") as (_, end, lose):
+        assert not end.has_begun()
+        lose()
+        assert end.has_begun()
+
+
+def test_master_that_does_not_answer_may_do_so_again(tmp_path):
+    end = EndOfSystem(tmp_path / "no.log", f"http://{QUIET_HOST}:1")
+    end._on_loss(View(Standing.MUTE, 7, "timed out"))
+    assert not end.has_begun()
+    wait_for(lambda: end._watch.lost, "nobody is there any more")

@@ -47,7 +47,7 @@ class NavigationMission(MissionNode[State]):
             settings: the mission.
             tree: the processes of this run; only these may be signalled.
             display: where the timeline is shown.
-            check: raises an error when the launched system has ended.
+            check: raises an error when the launched system ends.
 
         Raises:
             StartError: the master did not come up in time, or does not run on simulated time.

@@ -54,7 +54,7 @@ class MissionNode(ABC, Generic[State]):
 
         Args:
             display: where the timeline is shown.
-            check: raises an error when the launched system has ended.
+            check: raises an error when the launched system ends.
             thresholds: QA name -> level that must not be exceeded.
             decider: name of the node that decides; empty for the baseline.
 

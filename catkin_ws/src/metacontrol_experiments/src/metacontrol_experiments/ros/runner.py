@@ -122,6 +122,8 @@ def _run(settings: Settings, display: Display, make: Make[Node], tree: ProcessTr
     def check() -> None:
         if launch.poll() is not None:
             raise StartError(f"roslaunch has ended: {end.cause()}")
+        if end.has_begun():
+            raise StartError(f"roslaunch ends: {end.cause()}")
         if not is_driving and recorder.ended:
             raise StartError(f"the recorder has ended: {recorder.ended}")
         recorder.watch()
