@@ -38,7 +38,8 @@ class EndOfSystem:
 
     def has_begun(self) -> bool:
         """Tell whether all ends: the master is gone, or roslaunch ends its processes, for which it may take 20 s."""
-        self._has_begun = self._has_begun or is_ending(self._said_since())
+        if not self._has_begun and is_ending(self._said_since()):
+            self._has_begun = True  # and never False again: the watch's thread sets it, too
         return self._has_begun
 
     def cause(self) -> str:
@@ -48,7 +49,8 @@ class EndOfSystem:
     def _on_loss(self, view: View) -> None:
         if view.pid is not None and not is_ending(self._said()):  # roslaunch takes its master with it
             self._seen = one_line(view.text(self._uri, "").removesuffix(": "))
-            self._has_begun = view.standing is not Standing.MUTE
+            if view.standing is not Standing.MUTE:
+                self._has_begun = True
         if view.standing is Standing.MUTE:  # it may answer again
             self._watch = MasterWatch(lambda _: None, self._on_loss)
             self.watch()
