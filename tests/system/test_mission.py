@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 FACTOR = ("--real-time-factor", "2")
+SLOW = ("--real-time-factor", "0.5")
+"""A driver takes wall time to start, a report to arrive; a goal is given up, and faults strike, by simulated time."""
 CLUTTER = ("--contingency", "clutter:3", "--failure", "front_laser")
 LIMITS = ("--nfr-energy", "1", "--nfr-safety", "1")
 """On a busy machine, either level may ask for a change before the laser fails."""
@@ -147,7 +149,7 @@ def test_robot_without_its_laser_waits_in_the_dark_until_the_camera_sees(tmp_pat
     route = ("--routes", str(tmp_path / "routes.yaml"), "--route", "short")
     texts = ("light:0@time:1", "kill:front_laser@time:3", "light:1@time:8")
     strikes = [word for text in texts for word in ("--contingency", text)]
-    result = metacontrol("run", "--no-spares", "--output", str(tmp_path), *route, *strikes, *LIMITS, *FACTOR)
+    result = metacontrol("run", "--no-spares", "--output", str(tmp_path), *route, *strikes, *LIMITS, *SLOW)
     assert result.returncode == 0, account(result, tmp_path)
     record = read_record(tmp_path / "mission.bag")
     dark, *_ = [report.stamp for report in record.observed if report.name == "light" and report.level == 0.0]
@@ -165,8 +167,7 @@ def test_manager_in_place_of_the_reasoner_starts_the_dead_laser_again(tmp_path):
     (tmp_path / "routes.yaml").write_text("short: {start: [-8, -8, 0.78], goal: [-5, -5.6, 0]}\n")
     route = ("--routes", str(tmp_path / "routes.yaml"), "--route", "short")
     strike = ("--contingency", "kill:front_laser@time:2")
-    slow = ("--real-time-factor", "0.5")  # a driver takes wall time to start, a goal is given up by simulated time
-    result = metacontrol("run", "--output", str(tmp_path), "--manager", "respawn", *route, *strike, *slow)
+    result = metacontrol("run", "--output", str(tmp_path), "--manager", "respawn", *route, *strike, *SLOW)
     assert result.returncode == 0, account(result, tmp_path)
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["goal_reached"] and summary["reconfigurations"] == []

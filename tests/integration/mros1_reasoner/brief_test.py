@@ -45,11 +45,11 @@ class BriefTest(StationTest):
         return [decision.explanation for decision in self.decisions]
 
     def kill_again_and_again(self, ended):
-        """Kill each process of the looker a while after it has begun to answer."""
+        """Kill each process of the looker a while after it has begun to answer, once it counts as deployed."""
         while not ended.wait(0.02):
             with contextlib.suppress(rosgraph.MasterException, OSError, xmlrpc.client.Error):  # it is not there
                 pid = node_pid(self.name("looker"))
-                if not ended.wait(ALIVE):
+                if not ended.wait(ALIVE) and self.active.get("f_look", ("", ""))[1] == "STABLE":
                     os.kill(pid, signal.SIGKILL)
 
 

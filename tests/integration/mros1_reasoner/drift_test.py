@@ -33,7 +33,7 @@ class DriftTest(StationTest):
         self.addCleanup(ended.set)
         threading.Thread(target=self.disturb, args=(ended,), daemon=True).start()
         wait_for(lambda: "FAILED" in self.states_of("grasper"), lambda: f"it is given up: {self.decisions}")
-        refusal = next(d for d in self.decisions if d.state == "FAILED")
+        refusal = next(d for d in self.decisions if (d.state, d.trigger) == ("FAILED", "parameter:grasper"))
         self.assertIn("somebody sets them again and again", refusal.explanation)
         self.assertLessEqual(self.states_of("grasper").count("EXECUTED"), 3)
         self.wait_for_configurations()

@@ -48,6 +48,10 @@ class Robot:
         except (OSError, rosgraph.MasterException):
             return 0
 
+    def running_talker(self):
+        """Wait until a talker answers; return its process."""
+        return wait_for(self.talker, "a talker answers")
+
 
 class TalkerListenerTest(unittest.TestCase):
     @classmethod
@@ -68,7 +72,7 @@ class TalkerListenerTest(unittest.TestCase):
         robot = Robot()
         self.launch("talker_listener")
         wait_for(robot.is_frugal, "the frugal talker talks")
-        os.kill(robot.talker(), signal.SIGSTOP)
+        os.kill(robot.running_talker(), signal.SIGSTOP)
         wait_for_equal(robot.executed, THERE_AND_BACK, "what is executed")
         self.assertIn("freshness", robot.decisions[0].trigger)
         wait_for(robot.is_frugal, "the frugal talker runs again")
@@ -77,7 +81,7 @@ class TalkerListenerTest(unittest.TestCase):
         robot = Robot()
         self.launch("talker_listener")
         wait_for(robot.is_frugal, "the frugal talker talks")
-        dead = robot.talker()
+        dead = robot.running_talker()
         os.kill(dead, signal.SIGKILL)
         wait_for(lambda: robot.talker() not in (0, dead), "another talker runs")
         robot.heard = 0
@@ -87,7 +91,7 @@ class TalkerListenerTest(unittest.TestCase):
         amber, basil = Robot("/amber"), Robot("/basil")
         self.launch("two_robots")
         wait_for(lambda: amber.is_frugal() and basil.is_frugal(), "both talk")
-        os.kill(amber.talker(), signal.SIGSTOP)
+        os.kill(amber.running_talker(), signal.SIGSTOP)
         wait_for_equal(amber.executed, THERE_AND_BACK, "what amber executes")
         self.assertEqual(basil.executed(), [])
         self.assertTrue(basil.is_frugal())

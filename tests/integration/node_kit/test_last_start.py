@@ -67,9 +67,9 @@ class Ferry:
         return self.said(part)[said:]
 
     def said(self, part):
-        """Return all lines of a part about its start."""
+        """Return all lines of a part about its start, and none about short silences of the master."""
         lines = self._console.read_text(errors="replace").splitlines()
-        return [line for line in lines if line.startswith(f"/ferry/{part}: ")]
+        return [line for line in lines if line.startswith(f"/ferry/{part}: ") and "it ends if that lasts" not in line]
 
     def _has_begun(self, part, pid):
         """Tell whether the process of a part gives signs of life, as a part does when it has begun."""
@@ -144,6 +144,8 @@ def test_what_somebody_has_set_and_can_be_used_holds(ferry):
     ferry.master.call("setParam", "/ferry/rosgraph_manipulator/probation", 3.0)
     assert ferry.restarted("rosgraph_manipulator") == []
     assert ferry.get("/ferry/rosgraph_manipulator/probation") == 3.0
+    kept = f"{GROUP}/ferry__rosgraph_manipulator"
+    wait_for(lambda: '/probation": "3.0"' in str(ferry.get(kept)), lambda: f"it is kept: {ferry.get(kept)}")
     ferry.master.call("deleteParam", "/ferry/rosgraph_manipulator/probation")
     ferry.master.call("deleteParam", "/ferry/rosgraph_manipulator/configurations")
     ferry.restarted("rosgraph_manipulator")

@@ -18,7 +18,7 @@ import rospy
 from actionlib.msg import TestAction, TestGoal
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from geometry_msgs.msg import Twist
-from helpers.connections import hears
+from helpers.connections import hears, reaches
 from helpers.programs import program
 from helpers.waiting import DEADLINE_S, wait_for
 from metacontrol_msgs.msg import (
@@ -51,6 +51,13 @@ def is_alive(pid):
         return psutil.Process(pid).status() != psutil.STATUS_ZOMBIE
     except psutil.NoSuchProcess:
         return False
+
+
+def words_of(pid):
+    """The command of a process; that of one that has ended is like no other."""
+    with contextlib.suppress(psutil.Error):
+        return tuple(psutil.Process(pid).cmdline())
+    return (str(pid),)
 
 
 def configuration(**arguments):
@@ -242,6 +249,10 @@ class PairTest(unittest.TestCase):
     def send_goal(self):
         """Send a goal that stays pending; return its id and handle."""
         self.assertTrue(self.waiting.wait_for_server(rospy.Duration(DEADLINE_S)))
+        wait_for(
+            lambda: reaches(self.waiting.pub_goal, rospy.resolve_name("rosgraph_manipulator")),
+            "the manipulator hears it",
+        )
         return wait_for(self.try_goal, "a goal is at work")
 
     def try_goal(self):

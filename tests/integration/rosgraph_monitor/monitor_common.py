@@ -119,8 +119,10 @@ class GraphTest(unittest.TestCase):
         self.expect_order()
 
     def expect_order(self):
+        """Wait until all is as the model has it, and forget what was told before."""
         self.seen.forget()
         self.seen.wait_status("ROS Graph", "running OK", timeout=150.0)
+        self.seen.forget()
 
     def restore(self, name):
         self.start(name)

@@ -176,7 +176,8 @@ class MonitorMasterTest(unittest.TestCase):
         proxy.mode = "slow"
         monitor = self.start_monitor()
         proxy.mode = "garbage"
-        self.assertIn("garbage", monitor.stderr.readline())
+        lines = iter(monitor.stderr.readline, "")  # a silence of the slow master may be told before
+        self.assertTrue(any("garbage" in line for line in lines))
         proxy.mode = "pass"
         before = proxy.passed
         wait_for(lambda: proxy.passed > before + 20, "requests pass")  # looks at the graph, and more

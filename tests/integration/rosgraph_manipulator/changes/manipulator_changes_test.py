@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """Changes in heaps; parameters set at running nodes; standby; the commands."""
 
-import contextlib
 import os
 import random
 import subprocess
@@ -14,7 +13,7 @@ from actionlib_msgs.msg import GoalID, GoalStatus
 from dynamic_reconfigure.msg import Config
 from helpers.cases import case
 from helpers.waiting import DEADLINE_S, wait_for, wait_for_equal
-from integration.rosgraph_manipulator.manipulator_harness import PairTest, is_alive, pid_of
+from integration.rosgraph_manipulator.manipulator_harness import PairTest, is_alive, pid_of, words_of
 from rosgraph_launcher.launching.options import LauncherOptions
 
 RANDOM_REQUESTS = int(os.environ.get("MROS_RANDOM_REQUESTS", "10"))  # the benchmark makes 200
@@ -142,13 +141,6 @@ class ChangesTest(PairTest):
     def updates():
         message = rospy.wait_for_message("/tunable/parameter_updates", Config, DEADLINE_S)
         return next(entry.value for entry in message.doubles if entry.name == "controller_frequency")
-
-
-def words_of(pid):
-    """The command of a process; that of one that has ended is like no other."""
-    with contextlib.suppress(psutil.Error):
-        return tuple(psutil.Process(pid).cmdline())
-    return pid
 
 
 if __name__ == "__main__":

@@ -104,7 +104,7 @@ class ManipulatorTest(unittest.TestCase):
         goal_id = handle.comm_state_machine.action_goal.goal_id.id
         wait_for(lambda: self.server_goals.get(goal_id) == GoalStatus.ACTIVE, "the goal is active")
         self.change_to("fast")
-        self.assertEqual(self.server_goals.get(goal_id), GoalStatus.ACTIVE)
+        wait_for(lambda: self.server_goals.get(goal_id) == GoalStatus.ACTIVE, "the new server works at it")
         wait_for(lambda: self.is_reached(client), "the new server is reached")
         client.cancel_all_goals()
         wait_for(lambda: self.server_goals.get(goal_id) != GoalStatus.ACTIVE, "the goal is cancelled")
