@@ -22,10 +22,9 @@ class RepairsTest(GeneratedSystemTest):
         own = [d for d in self.decisions if d.trigger == f"component:{component}"]
         return [(d.state, d.from_configuration, d.to_configuration) for d in own]
 
-    def has_failed(self, *texts):
-        """Tell whether a decision has failed with these texts."""
-        failed = (decision.explanation for decision in self.decisions if decision.state == "FAILED")
-        return any(all(text in explanation for text in texts) for explanation in failed)
+    def failed(self, text):
+        """Return the decisions that have failed and whose explanations hold a text."""
+        return [d for d in self.decisions if d.state == "FAILED" and text in d.explanation]
 
     def wait_for_configuration(self, name):
         wait_for_equal(lambda: self.active, {"f_water": (name, "STABLE")}, "what waters")
@@ -55,7 +54,8 @@ class RepairsTest(GeneratedSystemTest):
         self.wait_for_configuration("drip")
         self.jam("valve_driver")
         self.wait_for_configuration("sprinkle")
-        wait_for(lambda: self.has_failed("valve is repaired", "it is stuck fast"), lambda: f"why: {self.decisions}")
+        failed = wait_for(lambda: self.failed("valve is repaired"), lambda: f"it is told: {self.decisions}")[0]
+        self.assertIn("it is stuck fast", failed.explanation)
         rospy.ServiceProxy(self.name("valve_driver/free"), Empty)()
         self.wait_for_configuration("drip")
 

@@ -87,9 +87,7 @@ class CellTest(unittest.TestCase):
     def test_arm_stops_at_an_obstacle_until_it_is_released(self):
         begin = self.state.next().positions
         self.assertEqual(self.move(-0.3, 1.5).error_code, FollowJointTrajectoryResult.SUCCESSFUL)
-        wait_for(
-            lambda: abs(self.state.next().positions[0] - begin[0] + 0.3) < 0.02, "it is told to be there", DEADLINE
-        )
+        self.assertAlmostEqual(self.state.next().positions[0], begin[0] - 0.3, delta=0.02)
         # A wall on the table, into which the arm turns.
         spawn = rospy.ServiceProxy("simulator/spawn_obstacle", SpawnObstacle)
         self.assertTrue(spawn(name="wall", x=-0.22, y=0.3, length=0.3, width=0.04, height=0.7).success)
@@ -116,7 +114,7 @@ class CellTest(unittest.TestCase):
         for width in (0.02, 0.08):
             ended = send_and_wait(self.gripper, GripperCommandGoal(GripperCommand(width, 20.0)), DEADLINE)
             self.assertTrue(ended.get_result().reached_goal)
-            wait_for(lambda: abs(self.state.next().gripper_width - width) < 0.004, f"{width} m is told", DEADLINE)  # noqa: B023
+            self.assertAlmostEqual(self.state.next().gripper_width, width, delta=0.004)
         ended = send_and_wait(self.gripper, GripperCommandGoal(GripperCommand(0.5, 20.0)), DEADLINE)
         self.assertEqual(ended.get_goal_status(), actionlib.GoalStatus.REJECTED)
 
