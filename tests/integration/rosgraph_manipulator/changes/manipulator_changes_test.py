@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
 """Changes in heaps; parameters set at running nodes; standby; the commands."""
 
+import itertools
 import os
 import random
 import subprocess
+import threading
 
 import psutil
 import rospy
@@ -66,12 +68,35 @@ class ChangesTest(PairTest):
         pair = [psutil.Process(node.pid) for node in (self.launcher, self.manipulator)]
         return sum(process.num_fds() for process in pair), sum(process.memory_info().rss for process in pair)
 
-    def test_goal_is_kept_though_the_server_has_rejected_newer_ones(self):
-        goal_id, _ = self.send_goal()
+    def goal_publisher(self):
+        """A publisher of goals that server and manipulator hear."""
         publisher = rospy.Publisher("wait/goal", TestActionGoal, queue_size=10)
         self.addCleanup(publisher.unregister)
         for node in ("/wait_server", "/rosgraph_manipulator"):
             wait_for(lambda: publisher.impl.has_connection(node), f"{node} listens")  # noqa: B023
+        return publisher
+
+    def test_goal_is_kept_though_newer_ones_come_all_the_time_and_are_rejected(self):
+        goal_id, _ = self.send_goal()
+        publisher, over = self.goal_publisher(), threading.Event()
+
+        def flood():
+            numbers = itertools.count()
+            while not over.wait(0.02):
+                publisher.publish(TestActionGoal(goal_id=GoalID(id=f"odd {next(numbers)}"), goal=TestGoal(-1)))
+
+        thread = threading.Thread(target=flood)
+        thread.start()
+        self.addCleanup(thread.join)
+        self.addCleanup(over.set)
+        wait_for(lambda: GoalStatus.REJECTED in self.server_goals.values(), "they are rejected")
+        old = self.server
+        self.assertEqual(self.request("fast"), 1, self.text)
+        self.wait_for_goal(goal_id, old)
+
+    def test_goal_is_kept_though_the_server_has_rejected_newer_ones(self):
+        goal_id, _ = self.send_goal()
+        publisher = self.goal_publisher()
         for name in ("", "odd", ""):
             publisher.publish(TestActionGoal(goal_id=GoalID(id=name), goal=TestGoal(-1)))
         wait_for(lambda: [*self.server_goals.values()].count(GoalStatus.REJECTED) == 3, "they are rejected")

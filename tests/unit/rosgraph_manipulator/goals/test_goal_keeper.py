@@ -15,11 +15,21 @@ def goal(goal_id, stamp=1):
 
 
 def status(goal_id, state):
-    return GoalStatusArray(status_list=[GoalStatus(goal_id=GoalID(id=goal_id, stamp=genpy.Time(1)), status=state)])
+    return listed((goal_id, state))
+
+
+def listed(*goals):
+    return GoalStatusArray(
+        status_list=[GoalStatus(goal_id=GoalID(id=name, stamp=genpy.Time(1)), status=state) for name, state in goals]
+    )
 
 
 def result(goal_id, state):
     return actionlib_test_messages.TestActionResult(status=GoalStatus(goal_id=GoalID(id=goal_id), status=state))
+
+
+def to_send(keeper, now):
+    return keeper.to_send(now)[0]
 
 
 @pytest.fixture
@@ -298,7 +308,7 @@ def test_adopted_goal_is_kept_until_the_new_server_has_it():
     keeper.adopt(goal("a"))
     keeper.server_changes(False)
     keeper.on_status(GoalStatusArray())  # the new server's, before the goal was sent to it
-    assert keeper.to_send(0.0).goal_id.id == "a"
+    assert to_send(keeper, 0.0).goal_id.id == "a"
 
 
 @pytest.mark.parametrize("is_adopted", [True, False])
@@ -307,8 +317,18 @@ def test_goal_at_work_that_was_replaced_is_a_stray(is_adopted):
     keeper.server_changes(True)
     (keeper.adopt if is_adopted else keeper.on_goal)(goal("old"))
     keeper.on_goal(goal("new"))
-    keeper.on_status(status("old", GoalStatus.ACTIVE))
+    keeper.on_status(listed(("old", GoalStatus.ACTIVE), ("new", GoalStatus.ACTIVE)))
     assert keeper.strays == {"old"}
+
+
+@pytest.mark.parametrize("is_adopted", [True, False])
+def test_goal_at_work_is_no_stray_while_the_server_has_not_taken_the_newer_one(is_adopted):
+    keeper = GoalKeeper()
+    keeper.server_changes(True)
+    (keeper.adopt if is_adopted else keeper.on_goal)(goal("old"))
+    keeper.on_goal(goal("new"))
+    keeper.on_status(status("old", GoalStatus.ACTIVE))
+    assert keeper.strays == frozenset()
 
 
 def test_goal_at_work_that_was_cancelled_is_a_stray():
@@ -342,27 +362,27 @@ def test_goal_at_work_of_which_no_message_has_come_is_missed(keeper):
 def test_goal_that_a_new_server_lacks_is_sent_again_and_again_until_it_has_it(keeper):
     keeper.server_changes(True)
     keeper.server_changes(False)
-    assert keeper.to_send(10.0).goal_id.id == "a"
-    assert keeper.to_send(10.05) is None  # the server has not had the time to tell that it has it
-    assert keeper.to_send(10.15).goal_id.id == "a"
+    assert to_send(keeper, 10.0).goal_id.id == "a"
+    assert to_send(keeper, 10.05) is None  # the server has not had the time to tell that it has it
+    assert to_send(keeper, 10.15).goal_id.id == "a"
     assert not keeper.is_delivered
     keeper.on_status(status("a", GoalStatus.ACTIVE))
-    assert keeper.to_send(20.0) is None
+    assert to_send(keeper, 20.0) is None
     assert keeper.is_delivered
 
 
 def test_every_new_server_is_sent_the_goal_at_once(keeper):
-    keeper.to_send(10.0)
+    to_send(keeper, 10.0)
     keeper.server_changes(True)
     keeper.server_changes(False)
-    assert keeper.to_send(10.1).goal_id.id == "a"
+    assert to_send(keeper, 10.1).goal_id.id == "a"
 
 
 def test_goal_that_was_cancelled_meanwhile_is_not_sent(keeper):
     keeper.server_changes(True)
     keeper.on_cancel(GoalID(id="a"))
     keeper.server_changes(False)
-    assert keeper.to_send(10.0) is None
+    assert to_send(keeper, 10.0) is None
     assert keeper.is_delivered
 
 
@@ -375,11 +395,11 @@ def waited_for(client=CLIENT):
 
 def next_server(keeper, takes_over=False, died=True, why_gone=""):
     """Let the server end, and another one come; return why the goal was dropped."""
-    reason = keeper.keep_for_next_server(why_gone, died)
+    reason = "".join(keeper.keep_for_next_server({CLIENT: why_gone} if why_gone else {}, died))
     keeper.server_changes(True)
     keeper.on_status(status("a", GoalStatus.ACTIVE) if takes_over else GoalStatusArray())
     keeper.server_changes(False)
-    sent = keeper.to_send(0.0)
+    sent = to_send(keeper, 0.0)
     if sent:
         keeper.on_goal(sent)  # it comes back on the topic
         keeper.on_status(status("a", GoalStatus.ACTIVE))
@@ -425,4 +445,196 @@ def test_new_goal_of_the_same_client_is_counted_anew():
 
 
 def test_without_a_goal_there_is_nothing_to_drop():
-    assert GoalKeeper().keep_for_next_server("its client /script has ended", died=True) == ""
+    assert GoalKeeper().keep_for_next_server({CLIENT: "its client /script has ended"}, died=True) == []
+
+
+OTHER = Client("/other", "http://host:2")
+
+
+def in_doubt(goals=("b",), changing=False, client=OTHER):
+    """A goal of CLIENT is at work, and newer ones come, of which the server has not told yet whether it takes them."""
+    keeper = waited_for()
+    keeper.server_changes(changing)
+    for number, name in enumerate(goals):
+        keeper.on_goal(goal(name, 2 + number), client)
+    return keeper
+
+
+def first(keeper):
+    wanted, client = keeper.first_for_next_server
+    assert keeper.first_id == (wanted and wanted.goal_id.id)
+    return keeper.first_id, client
+
+
+@pytest.mark.parametrize("changing", [True, False])
+@pytest.mark.parametrize("goals", [("b",), ("b", "c"), ("",)])
+def test_next_server_begins_with_the_goal_at_work_and_then_decides_on_newer_ones(changing, goals):
+    keeper = in_doubt(goals, changing)
+    assert keeper.keep_for_next_server({}, died=False) == []
+    assert first(keeper) == ("a", CLIENT)
+    keeper.server_changes(True)
+    keeper.on_status(status("a", GoalStatus.ACTIVE))  # the next server's
+    keeper.server_changes(False)
+    assert not keeper.strays
+    for name in reversed(goals):
+        sent = to_send(keeper, 0.0)
+        assert sent.goal_id.id == name
+        keeper.on_status(listed(("a", GoalStatus.ACTIVE), (name or "server-1", GoalStatus.REJECTED)))
+    assert keeper.is_delivered and (keeper.pending_id, keeper.client) == ("a", CLIENT)
+
+
+def test_next_server_that_takes_the_newer_goal_replaces_the_other_one():
+    keeper = in_doubt()
+    keeper.server_changes(True)
+    keeper.on_status(status("a", GoalStatus.ACTIVE))
+    keeper.server_changes(False)
+    assert to_send(keeper, 0.0).goal_id.id == "b"
+    keeper.on_status(listed(("a", GoalStatus.PREEMPTED), ("b", GoalStatus.ACTIVE)))
+    assert keeper.is_delivered and first(keeper) == ("b", OTHER)
+    keeper.on_result(result("b", GoalStatus.SUCCEEDED))
+    keeper.on_status(status("b", GoalStatus.SUCCEEDED))
+    assert keeper.pending is None and first(keeper) == (None, None)
+
+
+def test_flood_of_goals_that_are_rejected_leaves_the_one_at_work_though_some_are_listed_as_pending():
+    keeper = waited_for()
+    for number in range(100):
+        keeper.on_goal(goal(f"b{number}", 2))
+        keeper.on_status(listed(("a", GoalStatus.ACTIVE), (f"b{number}", GoalStatus.PENDING)))
+    assert first(keeper) == ("a", CLIENT)
+    for number in range(100):
+        keeper.on_result(result(f"b{number}", GoalStatus.REJECTED))
+    assert keeper.pending_id == "a"
+
+
+def test_flood_of_goals_before_any_status_leaves_the_first():
+    keeper = GoalKeeper()
+    for number in range(100):
+        keeper.on_goal(goal(f"b{number}", 2))
+    for number in reversed(range(1, 100)):
+        keeper.on_result(result(f"b{number}", GoalStatus.REJECTED))
+    assert keeper.pending_id == "b0"
+
+
+@pytest.mark.parametrize("state", [GoalStatus.RECALLED, GoalStatus.PREEMPTED, GoalStatus.ABORTED])
+@pytest.mark.parametrize("was_active", [True, False])
+def test_goal_is_kept_when_the_server_gives_a_newer_one_up_for_it(state, was_active):
+    keeper = in_doubt()  # its stamp is older, say, or its frame is unknown
+    if was_active:
+        keeper.on_status(listed(("a", GoalStatus.ACTIVE), ("b", GoalStatus.ACTIVE)))
+    keeper.on_result(result("b", state))
+    keeper.on_status(listed(("a", GoalStatus.ACTIVE), ("b", state)))
+    assert (keeper.pending_id, first(keeper)) == ("a", ("a", CLIENT))
+    keeper.on_result(result("a", GoalStatus.SUCCEEDED))
+    keeper.on_status(listed(("a", GoalStatus.SUCCEEDED), ("b", state)))
+    assert keeper.pending is None
+
+
+@pytest.mark.parametrize("state", [GoalStatus.REJECTED, GoalStatus.RECALLED])
+def test_goal_is_kept_at_once_when_the_server_has_never_taken_a_newer_one(state):
+    keeper = in_doubt()
+    keeper.on_result(result("b", state))
+    assert first(keeper) == ("a", CLIENT)
+
+
+@pytest.mark.parametrize("goes_on", [True, False])
+def test_goal_comes_back_when_the_newer_one_is_cancelled_only_where_the_server_goes_on_with_it(goes_on):
+    keeper = in_doubt()
+    keeper.on_cancel(GoalID(id="b"))
+    keeper.on_status(status("a", GoalStatus.ACTIVE if goes_on else GoalStatus.PREEMPTED))
+    assert keeper.pending_id == ("a" if goes_on else None)
+    keeper.on_goal(goal("c", 3))
+    keeper.on_result(result("c", GoalStatus.REJECTED))
+    assert keeper.pending_id == ("a" if goes_on else None)
+
+
+def test_cancelled_goal_that_the_server_takes_after_all_has_its_client():
+    keeper = in_doubt()
+    keeper.on_cancel(GoalID(id="b"))  # it may have been on its way
+    for _ in range(5):
+        keeper.on_status(listed(("a", GoalStatus.ACTIVE), ("b", GoalStatus.ACTIVE)))
+    assert (keeper.pending_id, first(keeper)) == ("b", ("b", OTHER))
+    keeper.on_status(listed(("a", GoalStatus.PREEMPTED), ("b", GoalStatus.SUCCEEDED)))
+    assert keeper.pending is None
+
+
+def test_goal_that_is_cancelled_during_a_change_ends_the_one_that_it_would_have_replaced():
+    keeper = in_doubt(changing=True)
+    keeper.on_cancel(GoalID(id="b"))
+    assert first(keeper) == (None, None)
+    keeper.on_status(status("a", GoalStatus.ACTIVE))  # the next server has taken it before
+    keeper.server_changes(False)
+    assert keeper.strays == {"a"}
+    keeper.on_status(status("a", GoalStatus.PREEMPTED))
+    assert keeper.pending is None
+
+
+def test_goal_at_work_is_not_kept_when_its_client_is_gone_though_a_newer_one_is_in_doubt():
+    keeper = in_doubt()
+    assert keeper.clients == {CLIENT, OTHER}
+    assert keeper.keep_for_next_server({CLIENT: "its client has ended"}, died=False) == [
+        "goal a is not sent to the next server: its client has ended"
+    ]
+    assert first(keeper) == ("b", OTHER)
+
+
+def test_goal_at_work_goes_on_when_the_client_of_a_newer_one_is_gone():
+    keeper = in_doubt()
+    assert keeper.keep_for_next_server({OTHER: "its client has ended"}, died=False) == [
+        "goal b is not sent to the next server: its client has ended"
+    ]
+    assert (keeper.pending_id, first(keeper)) == ("a", ("a", CLIENT))
+
+
+def test_goal_at_work_goes_on_when_a_newer_one_has_been_repeated_often_enough():
+    keeper = in_doubt(client=None)
+    for _ in range(3):
+        assert keeper.keep_for_next_server({}, died=True) == []
+    assert "has died 4 times" in "".join(keeper.keep_for_next_server({}, died=True))
+    assert keeper.pending_id == "a"
+
+
+def test_next_server_that_takes_nothing_over_is_sent_the_goal_at_work_first():
+    keeper = in_doubt()
+    keeper.server_changes(True)
+    keeper.on_status(GoalStatusArray())
+    keeper.server_changes(False)
+    assert [keeper.to_send(now) for now in (0.0, 0.05)] == [(goal("a"), CLIENT), (None, None)]
+    keeper.on_goal(goal("a"))  # it comes back on the topic
+    assert (keeper.pending_id, first(keeper)) == ("b", ("a", CLIENT))
+    keeper.on_status(status("a", GoalStatus.ACTIVE))
+    assert keeper.to_send(0.06) == (goal("b", 2), OTHER)
+    keeper.on_status(listed(("a", GoalStatus.ACTIVE), ("b", GoalStatus.REJECTED)))
+    assert keeper.is_delivered and keeper.pending_id == "a"
+
+
+def test_flood_of_goals_during_a_change_leaves_the_one_at_work():
+    keeper = waited_for()
+    keeper.server_changes(True)
+    keeper.on_status(GoalStatusArray())  # the next server's, which takes nothing over
+    for number in range(100):
+        keeper.on_goal(goal(f"b{number}", 2))
+    keeper.server_changes(False)
+    assert keeper.to_send(0.0) == (goal("a"), CLIENT)
+
+
+def test_client_that_repeats_a_goal_that_the_server_may_go_back_to_is_known():
+    keeper = in_doubt()
+    keeper.on_goal(goal("a"), OTHER)
+    assert (keeper.pending_id, first(keeper)) == ("b", ("a", OTHER))
+
+
+def test_nothing_is_left_of_goals_that_are_dropped():
+    keeper = in_doubt()
+    keeper.drop()
+    keeper.on_status(status("a", GoalStatus.ACTIVE))
+    assert keeper.pending is None and first(keeper) == (None, None)
+
+
+@pytest.mark.parametrize("is_at_work", [True, False])
+def test_adopted_goal_goes_on_beside_a_newer_one_only_where_the_server_has_it(is_at_work):
+    keeper = GoalKeeper()
+    keeper.adopt(goal("a"), CLIENT)
+    keeper.on_goal(goal("b", 2), OTHER)
+    keeper.on_status(status("a", GoalStatus.ACTIVE) if is_at_work else GoalStatusArray())
+    assert first(keeper) == (("a", CLIENT) if is_at_work else ("b", OTHER))

@@ -99,7 +99,7 @@ def around(monkeypatch):
 
 @pytest.fixture
 def followed(around):
-    return Launchers(timeout=0.1, host_timeout=0.0)
+    return Launchers(timeout=2.0, host_timeout=0.0)
 
 
 def tell(followed, who, change=3, nodes=("/nav",), configuration="slow", header=None, state="STABLE"):
@@ -234,7 +234,7 @@ def test_launcher_that_lives_may_take_its_time_for_a_change(followed, around, mo
 
     def is_answering(name):
         looks.append(name)
-        if len(looks) > 30:  # each takes WATCH_PERIOD: longer than the time to look for a launcher
+        if len(looks) > 250:  # each takes WATCH_PERIOD: longer than the time to look for a launcher
             done.set()
         return True
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import copy
 from collections import OrderedDict
+from collections.abc import Mapping
 from typing import Any
 
 from actionlib_msgs.msg import GoalStatus
@@ -24,6 +25,7 @@ SEND_PERIOD = 0.1  # s, after which a goal is sent again: the first one is mostl
 REPEATS = 3
 """How often a goal is repeated after its server died although nobody is known to wait: as often as the launcher starts
 a node again by default, before the configuration fails and the next one gets the goal."""
+NEVER_TAKEN = frozenset({GoalStatus.REJECTED, GoalStatus.RECALLED})  # the server goes on with what it had
 CONFIRMATIONS = 3  # statuses with a goal at work, every 0.2 s: more than a server needs to heed a cancellation
 ENDS_OF_THE_NEWEST = frozenset({GoalStatus.REJECTED, GoalStatus.SUCCEEDED, GoalStatus.ABORTED})
 """How a goal ends by itself; the others are replaced or cancelled."""
@@ -44,9 +46,10 @@ class GoalKeeper:
         self._is_repeat = False  # whether sending it to the next server counts as such
         self._finished: OrderedDict[str, None] = OrderedDict()
         self._replaced: OrderedDict[str, None] = OrderedDict()
-        # Goals that were replaced, with their clients and whether they are doubted, until the newer one is at work.
-        # Where the server rejects that, it goes on with what it had.
+        # Goals that newer ones came after, with their clients and whether they are doubted, until their end is told.
+        # Where the server does not take the newer one, it goes on with what it had.
         self._earlier: OrderedDict[str, tuple[Any, Client | None, bool]] = OrderedDict()
+        self._accepted: str | None = None  # the newest goal that was told to be active, and has not ended
         # Goals of which the end has come, but no message yet, with how many statuses may come before it. One without an
         # id can't be told from others by its message.
         self._nameless: OrderedDict[str, int] = OrderedDict()
@@ -55,10 +58,12 @@ class GoalKeeper:
         self._has_status = False  # whether a status has come: what ended before is known
         self._changing = False
         self._doubted = False  # the goal was known to an earlier keeper: the server has to confirm it
-        self._listed: frozenset[str] = frozenset()
-        self._cancelled: Any = None  # the goal that was cancelled last, until the server's status shows that it was
+        self._listed: frozenset[str] = frozenset()  # what the last status has at work
+        self._active: frozenset[str] = frozenset()  # what it told to be active
+        # The goal that was cancelled last, and who waits for it, until the server's status shows that it was.
+        self._cancelled: tuple[Any, Client | None] | None = None
         self._confirmations = 0  # statuses since then that have it at work
-        self._sent_at = float("-inf")  # when the pending goal was sent to the present server
+        self._sent = "", float("-inf")  # the goal that was sent to the present server last, and when
 
     @property
     def pending(self) -> Any:
@@ -76,6 +81,34 @@ class GoalKeeper:
         return self._client if self._goal is not None else None
 
     @property
+    def clients(self) -> frozenset[Client]:
+        """Who waits for the pending goal, or for one that the server may go back to."""
+        known = (self.client, *(client for _, client, _ in self._earlier.values()))
+        return frozenset(client for client in known if client is not None)
+
+    @property
+    def first_for_next_server(self) -> tuple[Any, Client | None]:
+        """The goal that the next server begins with, or None, and who waits for it.
+
+        That is the one at work, also where a newer one has come of which the server has not told whether it takes it.
+        The newer one is sent afterwards: the next server rejects it, or replaces the other one by it, as this one would
+        have done.
+        """
+        goal, client = self._first
+        return copy.deepcopy(goal), client
+
+    @property
+    def first_id(self) -> str | None:
+        """Id of the goal that the next server begins with, or None."""
+        goal, _ = self._first
+        return goal.goal_id.id if goal is not None else None
+
+    @property
+    def _first(self) -> tuple[Any, Client | None]:
+        at_work = self._earlier.get(self._accepted or "")
+        return at_work[:2] if at_work and self._goal is not None else (self._goal, self.client)
+
+    @property
     def is_at_work(self) -> bool:
         """Whether the server's last status lists the pending goal as PENDING or ACTIVE."""
         return self.pending_id in self._listed
@@ -84,9 +117,12 @@ class GoalKeeper:
     def strays(self) -> frozenset[str]:
         """Goals that the server works at although they were cancelled or replaced while it was being started.
 
-        A goal that is not known yet is none: the server may have heard of it earlier.
+        A goal that is not known yet is none: the server may have heard of it earlier. Nor is one that the server may go
+        on with, since it has not taken the newer one yet.
         """
-        return self._listed & (self._finished.keys() | self._replaced.keys()) - {self.pending_id}
+        over = self._finished.keys() | self._replaced.keys()
+        undecided = frozenset() if self.pending_id == self._accepted else self._earlier.keys()
+        return self._listed & over - undecided - {self.pending_id}
 
     @property
     def missed(self) -> frozenset[str]:
@@ -101,56 +137,75 @@ class GoalKeeper:
     def adopt(self, goal: Any, client: Client | None = None) -> None:
         """Begin with the pending goal of an earlier keeper, unless the server's next status shows that it has ended."""
         self._goal, self._client, self._doubted = copy.deepcopy(goal), client, True
+        self._accepted = goal.goal_id.id
 
-    def keep_for_next_server(self, why_gone: str, died: bool) -> str:
-        """Decide whether the next server gets the pending goal; else drop it, and return why.
+    def keep_for_next_server(self, why_gone: Mapping[Client, str], died: bool) -> list[str]:
+        """Decide which goals the next server gets; drop the others, and return why, a line for each.
 
         A client that waits keeps the goal alive, as long as no gap shows: the server takes the goal over. A goal that
         had to be sent again is lost for its client, and one without a client has nobody who waits. Both are repeated
         after every change that somebody asks for, but only a few times after a death, which they may have caused.
 
         Args:
-            why_gone: why the client does not wait any more; empty: it does, or there is none.
+            why_gone: why `clients` do not wait any more; empty, or none given: they do.
             died: whether the server has died, and is not replaced on request.
         """
+        dropped = []
+        for goal_id, (_, client, _) in [*self._earlier.items()]:
+            if client and why_gone.get(client):
+                self._finish(goal_id)
+                dropped.append(_not_sent(goal_id, why_gone[client]))
         if self._goal is None:
-            return ""
-        reason = why_gone
+            return dropped
+        reason = why_gone.get(self._client, "") if self._client else ""
         if not reason and died and self._repeats >= REPEATS:
             reason = f"its server has died {REPEATS + 1} times while it was pending, and nobody is known to wait for it"
         if reason:
-            goal_id = self.pending_id
-            self.drop()
-            return f"goal {goal_id} is not sent to the next server: {reason}"
-        self._repeats += died and self._client is None
-        self._is_repeat = died and self._client is not None
-        return ""
+            dropped.append(_not_sent(self._goal.goal_id.id, reason))
+            self.give_up(self._goal.goal_id.id)
+        else:
+            self._repeats += died and self._client is None
+            self._is_repeat = died and self._client is not None
+        return dropped
 
     def server_changes(self, changing: bool) -> None:
         """Note whether the server is being replaced. A goal that it drops meanwhile stays pending.
 
         The next server confirms nothing: it lacks the goal until it gets it.
         """
-        self._changing, self._cancelled, self._sent_at = changing, None, float("-inf")
+        self._changing, self._cancelled, self._sent = changing, None, ("", float("-inf"))
         self._doubted = self._doubted and changing
+        if not changing:
+            left = self._earlier if self._goal is not None else {}
+            self._earlier = OrderedDict((goal_id, (*known[:2], False)) for goal_id, known in left.items())
 
     @property
     def is_delivered(self) -> bool:
         """Whether the server has the pending goal, or no goal is pending."""
         return self._goal is None or self.is_at_work
 
-    def to_send(self, now: float) -> Any:
-        """Return the goal that must be sent again at `now` (s, a clock that never goes back); None: send nothing.
+    def keeps(self, goal_id: str) -> bool:
+        """Whether a goal is pending, or one that the server may go back to."""
+        return goal_id == self.pending_id or goal_id in self._earlier
+
+    def to_send(self, now: float) -> tuple[Any, Client | None]:
+        """Return the goal that must be sent again at `now` (s, a clock that never goes back), and who waits for it.
+
+        The first one for this server comes before the pending one. None: send nothing.
 
         A server may publish its status before it receives goals, and a goal sent too early is lost. So the goal is sent
         repeatedly. A server that has the goal already ignores it.
         """
-        if self.is_delivered or now - self._sent_at <= SEND_PERIOD:
-            return None
-        self._sent_at = now
-        self._repeats += self._is_repeat
-        self._is_repeat = False
-        return self.pending
+        goal, client = self._first
+        if goal is None or goal.goal_id.id in self._listed:
+            goal, client = self._goal, self.client
+        if self.is_delivered or (goal.goal_id.id == self._sent[0] and now - self._sent[1] <= SEND_PERIOD):
+            return None, None
+        self._sent = goal.goal_id.id, now
+        if goal is self._goal:
+            self._repeats += self._is_repeat
+            self._is_repeat = False
+        return copy.deepcopy(goal), client
 
     def on_goal(self, goal: Any, client: Client | None = None) -> None:
         """Process a message of the topic `goal`; a newer goal replaces the pending one, unless the server rejects it.
@@ -163,28 +218,40 @@ class GoalKeeper:
         if goal_id and goal_id in self._finished:
             self._nameless.pop(goal_id, None)
             return
+        if goal_id in self._earlier:  # a repetition, of which the server takes no notice
+            known, waits, doubted = self._earlier[goal_id]
+            self._earlier[goal_id] = known, client or waits, doubted
+            return
         if not goal_id and self._nameless:
             self._nameless.popitem(last=False)  # the server has named it, and told its end, before it came here
             return
         if goal_id and goal_id == self._guessed == self.pending_id and goal.goal != self._goal.goal:
             self._goal = None  # what came without an id had ended before
         is_newer = not goal_id or goal_id != self.pending_id
-        if is_newer and self.pending_id:
-            _remember(self._replaced, self.pending_id)
-            self._earlier[self.pending_id] = self._goal, self._client, self._doubted
-            if len(self._earlier) > MOST_EARLIER:
-                at_work = self._listed & self._earlier.keys()
-                self._earlier.pop(next(one for one in self._earlier if one not in at_work or len(at_work) > 1))
+        if is_newer:
+            self._set_aside()
         if is_newer or client:
             self._client, self._repeats, self._is_repeat = client, 0, False
         if is_newer:
-            self._earlier.pop(goal_id, None)
             self._goal, self._unnamed, self._guessed = copy.deepcopy(goal), 0, ""
         self._doubted, self._cancelled = False, None
+        self._note_accepted()
+
+    def _set_aside(self) -> None:
+        """Remember the pending goal, since a newer one takes its place; forget others where there are many."""
+        if not self.pending_id:
+            return
+        _remember(self._replaced, self.pending_id)
+        self._earlier[self.pending_id] = self._goal, self._client, self._doubted
+        if len(self._earlier) > MOST_EARLIER:
+            # The first is the one at work, as far as is known.
+            kept = self._accepted if self._accepted in self._earlier else next(iter(self._earlier))
+            self._earlier.pop(next(one for one in self._earlier if one != kept))
 
     def on_status(self, status: Any) -> None:
         """Process a message of the topic `status`: goals end, and a goal that was sent without an id gets one."""
         self._listed = frozenset(entry.goal_id.id for entry in status.status_list if entry.status in AT_WORK)
+        self._active = frozenset(one.goal_id.id for one in status.status_list if one.status == GoalStatus.ACTIVE)
         self._nameless = OrderedDict((goal_id, left - 1) for goal_id, left in self._nameless.items() if left > 1)
         for entry in status.status_list:
             goal_id, state = entry.goal_id.id, entry.status
@@ -195,15 +262,29 @@ class GoalKeeper:
                 # The server made up an id for a goal that came without one.
                 self._goal.goal_id.id, self._goal.goal_id.stamp = goal_id, entry.goal_id.stamp
                 self._guessed = goal_id
-            if state == GoalStatus.ACTIVE and goal_id == self.pending_id:
-                self._earlier.clear()
+        self._note_accepted()
         self._has_status = True
         self._give_up_unnamed()
         self._doubt_cancellation()
-        if self._doubted and not self._changing:
-            if not self.is_at_work:
-                self._goal = None
-            self._doubted = False
+        if not self._changing:
+            self._end_doubts()
+            if self._goal is None:  # an older goal may be at work again, or still
+                self._go_back()
+
+    def _note_accepted(self) -> None:
+        """Note which of the known goals the server has accepted last."""
+        if self.pending_id in self._active:
+            self._accepted = self.pending_id
+        else:
+            self._accepted = next((one for one in reversed(self._earlier) if one in self._active), self._accepted)
+
+    def _end_doubts(self) -> None:
+        """Drop what an earlier keeper knew, and what the server does not list."""
+        if self._doubted and not self.is_at_work:
+            self._goal = None
+        self._doubted = False
+        left = [(goal_id, known) for goal_id, known in self._earlier.items() if not known[2] or goal_id in self._listed]
+        self._earlier = OrderedDict((goal_id, (*known[:2], False)) for goal_id, known in left)
 
     def _give_up_unnamed(self) -> None:
         """Go back from a goal that came without an id, where the server has shown for long that it has none such."""
@@ -220,13 +301,15 @@ class GoalKeeper:
         """
         if self._cancelled is None:
             return
-        goal_id = self._cancelled.goal_id.id
+        goal, client = self._cancelled
+        goal_id = goal.goal_id.id
         if goal_id not in self._listed:
             self._cancelled = None
             return
         self._confirmations += 1
         if self._confirmations >= CONFIRMATIONS:
-            self._goal, self._cancelled = self._cancelled, None
+            self._set_aside()
+            self._goal, self._client, self._cancelled = goal, client, None
             self._finished.pop(goal_id, None)
 
     def on_result(self, result: Any) -> None:
@@ -240,13 +323,24 @@ class GoalKeeper:
             if _is_cancelled(goal.goal_id, cancel):
                 self._finish(goal.goal_id.id)
         if self._goal is not None and _is_cancelled(self._goal.goal_id, cancel):
-            self._cancelled, self._confirmations = None if self._changing else self._goal, 0
+            self._cancelled, self._confirmations = None if self._changing else (self._goal, self._client), 0
             self._finish(self._goal.goal_id.id)
 
     def drop(self) -> None:
-        """Let the pending goal be over."""
+        """Let the pending goal be over, and all that the server may go back to."""
+        for goal_id in [*self._earlier]:
+            self._finish(goal_id)
         if self._goal is not None:
             self._finish(self._goal.goal_id.id)
+
+    def give_up(self, goal_id: str) -> None:
+        """Let a goal be over; where it is the pending one, and the server has not taken it, go back to what it had."""
+        goes_back = goal_id == self.pending_id != self._accepted
+        if goes_back:
+            self._goal = None
+        self._finish(goal_id)
+        if goes_back:
+            self._go_back()
 
     @property
     def _is_without_id(self) -> bool:
@@ -261,10 +355,11 @@ class GoalKeeper:
                 self._goal.goal_id.id = goal_id
             else:
                 _remember(self._nameless, goal_id, LATE_STATUSES)
-        is_rejected = state == GoalStatus.REJECTED and goal_id == self.pending_id
-        self._finish(goal_id, is_rejected)  # also one not known yet: a result may arrive here before its goal
-        if is_rejected:
-            self._go_back()
+        # Also one not known yet: a result may arrive here before its goal.
+        if state in NEVER_TAKEN:
+            self.give_up(goal_id)
+        else:
+            self._finish(goal_id)
 
     def _go_back(self) -> None:
         """Have the goal pending again that the last one had replaced, which the server did not take: it goes on."""
@@ -276,13 +371,18 @@ class GoalKeeper:
         """Tell whether a message of a goal has come, or its end."""
         return goal_id == self.pending_id or goal_id in self._replaced or goal_id in self._finished
 
-    def _finish(self, goal_id: str, is_rejected: bool = False) -> None:
+    def _finish(self, goal_id: str) -> None:
         self._earlier.pop(goal_id, None)
+        self._accepted = self._accepted if self._accepted != goal_id else None
         if goal_id == self.pending_id:
             self._goal = None
-            if not is_rejected:
-                self._earlier.clear()
+            # It has replaced them, unless the server's next status shows that it has not.
+            self._earlier = OrderedDict((one, (*known[:2], True)) for one, known in self._earlier.items())
         _remember(self._finished, goal_id)
+
+
+def _not_sent(goal_id: str, reason: str) -> str:
+    return f"goal {goal_id} is not sent to the next server: {reason}"
 
 
 def _is_cancelled(goal_id: Any, cancel: Any) -> bool:

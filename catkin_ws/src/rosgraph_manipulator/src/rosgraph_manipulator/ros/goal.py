@@ -88,7 +88,7 @@ class PendingGoal:
             # A goal that has ended while there was no manipulator is dropped by the first status of the server, and no
             # later one of this server can be taken for one of the next.
             wait_until(lambda: self._server is not None, STATUS_TIMEOUT)
-        why_gone = self._clients.why_gone(self._keeper.client, leaving)
+        why_gone = {client: self._clients.why_gone(client, leaving) for client in self._keeper.clients}
         for goal_id in self._keeper.missed:
             missed = f"its client sent it before {rospy.get_name()} was connected to it: use action_relay"
             rospy.logwarn("%s: goal %s is not kept: %s", self._action, goal_id, missed)
@@ -98,8 +98,8 @@ class PendingGoal:
             self._server = None if is_back else self._server
             self._old_server = self._server
             self._store(again=True)
-        if dropped:
-            rospy.logwarn("%s: %s", self._action, dropped)
+        for line in dropped:
+            rospy.logwarn("%s: %s", self._action, line)
 
     @property
     def is_between_servers(self) -> bool:
@@ -130,16 +130,16 @@ class PendingGoal:
     def deliver(self) -> bool:
         """Send the goal if it is time; return whether the server has it or no goal is pending."""
         with self._lock:
-            goal, client = self._keeper.to_send(time.monotonic()), self._keeper.client
+            goal, client = self._keeper.to_send(time.monotonic())
         if goal is None:
             return self._keeper.is_delivered
         why_gone = self._clients.why_gone(client)
         with self._lock:
             if why_gone:
                 rospy.logwarn("%s: goal %s is not sent to the new server: %s", self._action, goal.goal_id.id, why_gone)
-                self._keeper.drop()
+                self._keeper.give_up(goal.goal_id.id)
                 self._store()
-            elif self._keeper.pending_id == goal.goal_id.id:
+            elif self._keeper.keeps(goal.goal_id.id):
                 rospy.loginfo("sending the pending goal %s to the new server of %s", goal.goal_id.id, self._action)
                 self._goal_publisher.publish(goal)
             return self._keeper.is_delivered
@@ -172,8 +172,8 @@ class PendingGoal:
         return locked
 
     def _store(self, again: bool = False) -> None:
-        """Update the parameters."""
-        goal_id = self._keeper.pending_id
+        """Update the parameters, where another goal is the first for the next server, or the same one `again`."""
+        goal_id = self._keeper.first_id
         is_unnamed = goal_id == "" and not self._keeper.server_is_changing
         if (goal_id == self._stored or is_unnamed) and not (again and goal_id is not None):
             return
@@ -182,9 +182,9 @@ class PendingGoal:
                 self._delete()
             else:
                 buffer = io.BytesIO()
-                self._keeper.pending.serialize(buffer)
+                goal, client = self._keeper.first_for_next_server
+                goal.serialize(buffer)
                 data = base64.b64encode(buffer.getvalue()).decode("ascii")
-                client = self._keeper.client
                 waits = {"client": [client.node, client.address]} if client else {}
                 for parameter in self._parameters:
                     rospy.set_param(parameter, {"type": self._goal_type, "data": data, **waits})
