@@ -624,6 +624,48 @@ def test_client_that_repeats_a_goal_that_the_server_may_go_back_to_is_known():
     assert (keeper.pending_id, first(keeper)) == ("b", ("a", OTHER))
 
 
+def test_client_that_replaces_its_own_goal_and_cancels_the_new_one_wants_neither():
+    keeper = in_doubt(client=CLIENT)
+    keeper.on_cancel(GoalID(id="b"))
+    keeper.on_status(status("a", GoalStatus.ACTIVE))  # it has been asked to end
+    assert first(keeper) == (None, None)
+    assert keeper.strays == {"a"}
+
+
+def test_goal_that_the_server_has_taken_and_that_is_cancelled_brings_no_older_one_back():
+    keeper = in_doubt()
+    keeper.on_status(listed(("a", GoalStatus.ACTIVE), ("b", GoalStatus.PENDING)))
+    keeper.on_cancel(GoalID(id="b"))
+    keeper.on_status(listed(("a", GoalStatus.ACTIVE), ("b", GoalStatus.RECALLING)))
+    assert first(keeper) == (None, None)
+
+
+@pytest.mark.parametrize("end", [GoalID(id="b"), result("b", GoalStatus.SUCCEEDED)])
+def test_goal_that_was_replaced_does_not_come_back_when_another_one_follows_in_a_change(end):
+    keeper = in_doubt(changing=True)
+    (keeper.on_cancel if isinstance(end, GoalID) else keeper.on_result)(end)
+    keeper.on_goal(goal("c", 3), OTHER)
+    assert first(keeper) == ("c", OTHER)
+    keeper.server_changes(False)
+    keeper.on_result(result("c", GoalStatus.REJECTED))
+    assert keeper.pending is None
+
+
+def test_newer_goal_comes_first_when_servers_die_again_and_again_of_the_one_at_work():
+    keeper = in_doubt()
+    begun = []
+    for _ in range(3):
+        assert keeper.keep_for_next_server({}, died=True) == []
+        begun.append(keeper.first_id)
+        keeper.server_changes(True)
+        keeper.on_status(GoalStatusArray())
+        keeper.server_changes(False)
+    assert begun == ["a", "b", "b"]
+    assert keeper.to_send(0.0) == (goal("b", 2), OTHER)
+    keeper.on_result(result("b", GoalStatus.REJECTED))
+    assert keeper.to_send(1.0) == (goal("a"), CLIENT)
+
+
 def test_nothing_is_left_of_goals_that_are_dropped():
     keeper = in_doubt()
     keeper.drop()

@@ -50,6 +50,7 @@ class GoalKeeper:
         # Where the server does not take the newer one, it goes on with what it had.
         self._earlier: OrderedDict[str, tuple[Any, Client | None, bool]] = OrderedDict()
         self._accepted: str | None = None  # the newest goal that was told to be active, and has not ended
+        self._died_with: str | None = None  # the goal that the next server was to begin with when one died last
         # Goals of which the end has come, but no message yet, with how many statuses may come before it. One without an
         # id can't be told from others by its message.
         self._nameless: OrderedDict[str, int] = OrderedDict()
@@ -127,7 +128,9 @@ class GoalKeeper:
     @property
     def missed(self) -> frozenset[str]:
         """Goals that the server works at, although no message of them has come: they can't be kept."""
-        return frozenset() if self._goal is not None else self._listed - self._finished.keys()
+        if self._goal is not None:
+            return frozenset()
+        return self._listed - self._finished.keys() - self._replaced.keys()
 
     @property
     def server_is_changing(self) -> bool:
@@ -155,6 +158,10 @@ class GoalKeeper:
             if client and why_gone.get(client):
                 self._finish(goal_id)
                 dropped.append(_not_sent(goal_id, why_gone[client]))
+        if died:
+            if self.first_id == self._died_with:
+                self._accepted = None  # servers may die of it: the newest goal comes first
+            self._died_with = self.first_id
         if self._goal is None:
             return dropped
         reason = why_gone.get(self._client, "") if self._client else ""
@@ -228,6 +235,8 @@ class GoalKeeper:
         if goal_id and goal_id == self._guessed == self.pending_id and goal.goal != self._goal.goal:
             self._goal = None  # what came without an id had ended before
         is_newer = not goal_id or goal_id != self.pending_id
+        if self._goal is None and self._changing:
+            self._earlier.clear()  # what they were replaced by is over
         if is_newer:
             self._set_aside()
         if is_newer or client:
@@ -323,6 +332,10 @@ class GoalKeeper:
             if _is_cancelled(goal.goal_id, cancel):
                 self._finish(goal.goal_id.id)
         if self._goal is not None and _is_cancelled(self._goal.goal_id, cancel):
+            # Who replaces its own goal, and cancels the new one, wants neither; nor does a server that has taken it.
+            for goal_id, (_, client, _) in [*self._earlier.items()]:
+                if self.is_at_work or client == self._client:
+                    self._finish(goal_id)
             self._cancelled, self._confirmations = None if self._changing else (self._goal, self._client), 0
             self._finish(self._goal.goal_id.id)
 

@@ -88,7 +88,9 @@ class PendingGoal:
             # A goal that has ended while there was no manipulator is dropped by the first status of the server, and no
             # later one of this server can be taken for one of the next.
             wait_until(lambda: self._server is not None, STATUS_TIMEOUT)
-        why_gone = {client: self._clients.why_gone(client, leaving) for client in self._keeper.clients}
+        with self._lock:
+            clients = self._keeper.clients
+        why_gone = {client: self._clients.why_gone(client, leaving) for client in clients}
         for goal_id in self._keeper.missed:
             missed = f"its client sent it before {rospy.get_name()} was connected to it: use action_relay"
             rospy.logwarn("%s: goal %s is not kept: %s", self._action, goal_id, missed)
@@ -115,10 +117,8 @@ class PendingGoal:
         """Note that a new server is there, and cancel at it what was cancelled meanwhile."""
         with self._lock:
             self._keeper.server_changes(False)
-            strays = self._keeper.strays
             self._store(again=True)  # the server may have taken it from there
-        for goal_id in strays:
-            self._cancel_publisher.publish(GoalID(id=goal_id))
+            self._cancel_strays()
 
     def drop(self) -> None:
         """Forget the pending goal: its function is needed no longer."""
@@ -131,8 +131,11 @@ class PendingGoal:
         """Send the goal if it is time; return whether the server has it or no goal is pending."""
         with self._lock:
             goal, client = self._keeper.to_send(time.monotonic())
+            if goal is None and self._keeper.is_delivered:
+                self._cancel_strays()  # what was cancelled since the server is there
+                return True
         if goal is None:
-            return self._keeper.is_delivered
+            return False
         why_gone = self._clients.why_gone(client)
         with self._lock:
             if why_gone:
@@ -143,6 +146,10 @@ class PendingGoal:
                 rospy.loginfo("sending the pending goal %s to the new server of %s", goal.goal_id.id, self._action)
                 self._goal_publisher.publish(goal)
             return self._keeper.is_delivered
+
+    def _cancel_strays(self) -> None:
+        for goal_id in self._keeper.strays:
+            self._cancel_publisher.publish(GoalID(id=goal_id))
 
     def _on_goal(self, goal: Any) -> None:
         client = self._clients.of(goal)  # it asks the master, so nobody is kept waiting
