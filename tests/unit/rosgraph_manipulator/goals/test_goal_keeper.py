@@ -312,23 +312,14 @@ def test_adopted_goal_is_kept_until_the_new_server_has_it():
 
 
 @pytest.mark.parametrize("is_adopted", [True, False])
-def test_goal_at_work_that_was_replaced_is_a_stray(is_adopted):
+@pytest.mark.parametrize("at_work", [("old", "new"), ("old",)])
+def test_goal_at_work_that_was_replaced_is_a_stray_once_the_server_has_taken_the_newer_one(is_adopted, at_work):
     keeper = GoalKeeper()
     keeper.server_changes(True)
     (keeper.adopt if is_adopted else keeper.on_goal)(goal("old"))
     keeper.on_goal(goal("new"))
-    keeper.on_status(listed(("old", GoalStatus.ACTIVE), ("new", GoalStatus.ACTIVE)))
-    assert keeper.strays == {"old"}
-
-
-@pytest.mark.parametrize("is_adopted", [True, False])
-def test_goal_at_work_is_no_stray_while_the_server_has_not_taken_the_newer_one(is_adopted):
-    keeper = GoalKeeper()
-    keeper.server_changes(True)
-    (keeper.adopt if is_adopted else keeper.on_goal)(goal("old"))
-    keeper.on_goal(goal("new"))
-    keeper.on_status(status("old", GoalStatus.ACTIVE))
-    assert keeper.strays == frozenset()
+    keeper.on_status(listed(*((name, GoalStatus.ACTIVE) for name in at_work)))
+    assert keeper.strays == ({"old"} if "new" in at_work else set())
 
 
 def test_goal_at_work_that_was_cancelled_is_a_stray():

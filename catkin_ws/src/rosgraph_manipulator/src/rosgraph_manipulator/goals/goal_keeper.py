@@ -8,6 +8,7 @@ from __future__ import annotations
 import copy
 from collections import OrderedDict
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from actionlib_msgs.msg import GoalStatus
@@ -36,6 +37,21 @@ UNNAMED_STATUSES = 15
 came then, on a busy machine. Else it would wait for ever, and be taken for the next goal."""
 
 
+@dataclass
+class _Earlier:
+    """A goal that a newer one came after, and that the server may go back to.
+
+    Attributes:
+        goal: the message.
+        client: who waits for it; None: nobody who is known.
+        doubted: whether it is over unless the server's next status lists it.
+    """
+
+    goal: Any
+    client: Client | None
+    doubted: bool
+
+
 class GoalKeeper:
     """Knows the newest goal of an action that is neither finished nor cancelled."""
 
@@ -46,9 +62,8 @@ class GoalKeeper:
         self._is_repeat = False  # whether sending it to the next server counts as such
         self._finished: OrderedDict[str, None] = OrderedDict()
         self._replaced: OrderedDict[str, None] = OrderedDict()
-        # Goals that newer ones came after, with their clients and whether they are doubted, until their end is told.
-        # Where the server does not take the newer one, it goes on with what it had.
-        self._earlier: OrderedDict[str, tuple[Any, Client | None, bool]] = OrderedDict()
+        # Until their end is told. Where the server does not take the newer one, it goes on with what it had.
+        self._earlier: OrderedDict[str, _Earlier] = OrderedDict()
         self._accepted: str | None = None  # the newest goal that was told to be active, and has not ended
         self._died_with: str | None = None  # the goal that the next server was to begin with when one died last
         # Goals of which the end has come, but no message yet, with how many statuses may come before it. One without an
@@ -84,7 +99,7 @@ class GoalKeeper:
     @property
     def clients(self) -> frozenset[Client]:
         """Who waits for the pending goal, or for one that the server may go back to."""
-        known = (self.client, *(client for _, client, _ in self._earlier.values()))
+        known = (self.client, *(earlier.client for earlier in self._earlier.values()))
         return frozenset(client for client in known if client is not None)
 
     @property
@@ -107,7 +122,7 @@ class GoalKeeper:
     @property
     def _first(self) -> tuple[Any, Client | None]:
         at_work = self._earlier.get(self._accepted or "")
-        return at_work[:2] if at_work and self._goal is not None else (self._goal, self.client)
+        return (at_work.goal, at_work.client) if at_work and self._goal is not None else (self._goal, self.client)
 
     @property
     def is_at_work(self) -> bool:
@@ -154,10 +169,10 @@ class GoalKeeper:
             died: whether the server has died, and is not replaced on request.
         """
         dropped = []
-        for goal_id, (_, client, _) in [*self._earlier.items()]:
-            if client and why_gone.get(client):
+        for goal_id, earlier in [*self._earlier.items()]:
+            if earlier.client and why_gone.get(earlier.client):
                 self._finish(goal_id)
-                dropped.append(_not_sent(goal_id, why_gone[client]))
+                dropped.append(_not_sent(goal_id, why_gone[earlier.client]))
         if died:
             if self.first_id == self._died_with:
                 self._accepted = None  # servers may die of it: the newest goal comes first
@@ -183,8 +198,9 @@ class GoalKeeper:
         self._changing, self._cancelled, self._sent = changing, None, ("", float("-inf"))
         self._doubted = self._doubted and changing
         if not changing:
-            left = self._earlier if self._goal is not None else {}
-            self._earlier = OrderedDict((goal_id, (*known[:2], False)) for goal_id, known in left.items())
+            self._doubt_earlier(False)
+            if self._goal is None:
+                self._earlier.clear()
 
     @property
     def is_delivered(self) -> bool:
@@ -198,7 +214,7 @@ class GoalKeeper:
     def to_send(self, now: float) -> tuple[Any, Client | None]:
         """Return the goal that must be sent again at `now` (s, a clock that never goes back), and who waits for it.
 
-        The first one for this server comes before the pending one. None: send nothing.
+        The first one for this server comes before the pending one. Both are None where nothing is to be sent.
 
         A server may publish its status before it receives goals, and a goal sent too early is lost. So the goal is sent
         repeatedly. A server that has the goal already ignores it.
@@ -226,8 +242,8 @@ class GoalKeeper:
             self._nameless.pop(goal_id, None)
             return
         if goal_id in self._earlier:  # a repetition, of which the server takes no notice
-            known, waits, doubted = self._earlier[goal_id]
-            self._earlier[goal_id] = known, client or waits, doubted
+            earlier = self._earlier[goal_id]
+            earlier.client = client or earlier.client
             return
         if not goal_id and self._nameless:
             self._nameless.popitem(last=False)  # the server has named it, and told its end, before it came here
@@ -251,7 +267,7 @@ class GoalKeeper:
         if not self.pending_id:
             return
         _remember(self._replaced, self.pending_id)
-        self._earlier[self.pending_id] = self._goal, self._client, self._doubted
+        self._earlier[self.pending_id] = _Earlier(self._goal, self._client, self._doubted)
         if len(self._earlier) > MOST_EARLIER:
             # The first is the one at work, as far as is known.
             kept = self._accepted if self._accepted in self._earlier else next(iter(self._earlier))
@@ -288,12 +304,18 @@ class GoalKeeper:
             self._accepted = next((one for one in reversed(self._earlier) if one in self._active), self._accepted)
 
     def _end_doubts(self) -> None:
-        """Drop what an earlier keeper knew, and what the server does not list."""
+        """Drop what is doubted and not listed; doubt the rest no longer."""
         if self._doubted and not self.is_at_work:
             self._goal = None
         self._doubted = False
-        left = [(goal_id, known) for goal_id, known in self._earlier.items() if not known[2] or goal_id in self._listed]
-        self._earlier = OrderedDict((goal_id, (*known[:2], False)) for goal_id, known in left)
+        for goal_id, earlier in [*self._earlier.items()]:
+            if earlier.doubted and goal_id not in self._listed:
+                self._earlier.pop(goal_id)
+        self._doubt_earlier(False)
+
+    def _doubt_earlier(self, doubted: bool) -> None:
+        for earlier in self._earlier.values():
+            earlier.doubted = doubted
 
     def _give_up_unnamed(self) -> None:
         """Go back from a goal that came without an id, where the server has shown for long that it has none such."""
@@ -328,13 +350,13 @@ class GoalKeeper:
 
     def on_cancel(self, cancel: Any) -> None:
         """Process a message of the topic `cancel`, by actionlib's rules: by id, up to a time, or all."""
-        for goal, *_ in [*self._earlier.values()]:
-            if _is_cancelled(goal.goal_id, cancel):
-                self._finish(goal.goal_id.id)
+        for goal_id, earlier in [*self._earlier.items()]:
+            if _is_cancelled(earlier.goal.goal_id, cancel):
+                self._finish(goal_id)
         if self._goal is not None and _is_cancelled(self._goal.goal_id, cancel):
             # Who replaces its own goal, and cancels the new one, wants neither; nor does a server that has taken it.
-            for goal_id, (_, client, _) in [*self._earlier.items()]:
-                if self.is_at_work or client == self._client:
+            for goal_id, earlier in [*self._earlier.items()]:
+                if self.is_at_work or earlier.client == self._client:
                     self._finish(goal_id)
             self._cancelled, self._confirmations = None if self._changing else (self._goal, self._client), 0
             self._finish(self._goal.goal_id.id)
@@ -377,7 +399,8 @@ class GoalKeeper:
     def _go_back(self) -> None:
         """Have the goal pending again that the last one had replaced, which the server did not take: it goes on."""
         if self._earlier:
-            self._goal, self._client, self._doubted = self._earlier.popitem()[1]
+            _, earlier = self._earlier.popitem()
+            self._goal, self._client, self._doubted = earlier.goal, earlier.client, earlier.doubted
             self._repeats, self._is_repeat = 0, False
 
     def _is_known(self, goal_id: str) -> bool:
@@ -386,11 +409,11 @@ class GoalKeeper:
 
     def _finish(self, goal_id: str) -> None:
         self._earlier.pop(goal_id, None)
-        self._accepted = self._accepted if self._accepted != goal_id else None
+        if goal_id == self._accepted:
+            self._accepted = None
         if goal_id == self.pending_id:
             self._goal = None
-            # It has replaced them, unless the server's next status shows that it has not.
-            self._earlier = OrderedDict((one, (*known[:2], True)) for one, known in self._earlier.items())
+            self._doubt_earlier(True)  # it has replaced them, unless the server's next status shows that it has not
         _remember(self._finished, goal_id)
 
 
