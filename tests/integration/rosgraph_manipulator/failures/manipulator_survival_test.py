@@ -16,6 +16,7 @@ import time
 import rosgraph
 import rospy
 import rostest
+from actionlib.msg import TestGoal
 from actionlib_msgs.msg import GoalStatus
 from geometry_msgs.msg import Twist
 from helpers.cases import case
@@ -56,8 +57,8 @@ class SurvivalTest(PairTest):
         """Wait until the manipulator has stored a goal for the next manipulator."""
 
         def is_stored():
-            stored = rospy.get_param("wait/resume_goal", {}).get("data", "")
-            return goal_id.encode() in base64.b64decode(stored)
+            kept = rospy.get_param("rosgraph_manipulator/kept_goals/wait", [])
+            return any(goal_id.encode() in base64.b64decode(one["data"]) for one in kept)
 
         wait_for(is_stored, f"goal {goal_id} is stored")
 
@@ -117,6 +118,20 @@ class SurvivalTest(PairTest):
         self.wait_until_it_serves()
         self.assertEqual(self.request("fast"), 1)
         self.wait_for_goal(goal_id, server)
+
+    def test_goal_that_comes_in_a_change_is_known_to_a_manipulator_that_comes_back(self):
+        goal_id, _ = self.send_goal()
+        self.wait_until_kept(goal_id)
+        server, before = self.server, pid_of("/wait_server")
+        self.client.send_goal(MvpReconfigurationGoal("fast"))
+        wait_for(lambda: not is_alive(before), "its server has ended")
+        newer = self.waiting.send_goal(TestGoal(0))
+        newer_id = newer.comm_state_machine.action_goal.goal_id.id
+        self.wait_until_kept(newer_id)
+        self.manipulator.end(signal.SIGKILL)
+        self.restart_manipulator()
+        self.wait_for_state("fast")
+        self.wait_for_goal(newer_id, server)
 
     def test_goal_that_ends_while_there_is_no_manipulator_is_not_resurrected(self):
         goal_id, _ = self.send_goal()

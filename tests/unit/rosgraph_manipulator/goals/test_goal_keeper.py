@@ -5,7 +5,13 @@ import pytest
 from actionlib import msg as actionlib_test_messages
 from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from rosgraph_manipulator.goals.clients import Client
-from rosgraph_manipulator.goals.goal_keeper import LATE_STATUSES, UNNAMED_STATUSES, GoalKeeper
+from rosgraph_manipulator.goals.goal_keeper import (
+    CONFIRMATIONS,
+    LATE_STATUSES,
+    LONGEST_WAIT,
+    UNNAMED_STATUSES,
+    GoalKeeper,
+)
 
 CLIENT = Client("/script", "http://host:1")
 
@@ -457,6 +463,12 @@ def first(keeper):
     return keeper.first_id, client
 
 
+def tell_nothing(keeper):
+    """A server shows that it has heard of no goal."""
+    for _ in range(CONFIRMATIONS):
+        keeper.on_status(GoalStatusArray())
+
+
 @pytest.mark.parametrize("changing", [True, False])
 @pytest.mark.parametrize("goals", [("b",), ("b", "c"), ("",)])
 def test_next_server_begins_with_the_goal_at_work_and_then_decides_on_newer_ones(changing, goals):
@@ -588,7 +600,7 @@ def test_goal_at_work_goes_on_when_a_newer_one_has_been_repeated_often_enough():
 def test_next_server_that_takes_nothing_over_is_sent_the_goal_at_work_first():
     keeper = in_doubt()
     keeper.server_changes(True)
-    keeper.on_status(GoalStatusArray())
+    tell_nothing(keeper)
     keeper.server_changes(False)
     assert [keeper.to_send(now) for now in (0.0, 0.05)] == [(goal("a"), CLIENT), (None, None)]
     keeper.on_goal(goal("a"))  # it comes back on the topic
@@ -599,12 +611,49 @@ def test_next_server_that_takes_nothing_over_is_sent_the_goal_at_work_first():
     assert keeper.is_delivered and keeper.pending_id == "a"
 
 
+@pytest.mark.parametrize("changing", [True, False])
+@pytest.mark.parametrize("is_rejected", [True, False])
+def test_goal_that_the_next_server_may_have_heard_itself_is_not_replaced_by_the_one_before(changing, is_rejected):
+    keeper = waited_for()
+    keeper.server_changes(True)
+    tell_nothing(keeper)
+    keeper.server_changes(changing)
+    keeper.on_goal(goal("b", 2), OTHER)
+    keeper.on_status(GoalStatusArray())  # it was sent before
+    keeper.server_changes(False)
+    assert to_send(keeper, 0.0) is None
+    keeper.on_status(status("b", GoalStatus.REJECTED if is_rejected else GoalStatus.ACTIVE))
+    assert (keeper.pending_id, keeper.is_delivered) == (("a", False) if is_rejected else ("b", True))
+    assert to_send(keeper, 1.0) == (goal("a") if is_rejected else None)
+
+
+def test_goal_at_work_is_sent_after_a_while_to_a_server_whose_clock_stands_still():
+    keeper = in_doubt()
+    keeper.server_changes(True)
+    keeper.on_status(GoalStatusArray())
+    keeper.server_changes(False)
+    assert [to_send(keeper, now) for now in (0.0, LONGEST_WAIT - 0.1)] == [None, None]
+    assert to_send(keeper, LONGEST_WAIT) == goal("a")
+
+
+@pytest.mark.parametrize("is_taken", [True, False])
+def test_goal_that_was_to_be_sent_is_not_the_next_one_any_more_when_the_server_has_taken_a_newer_one(is_taken):
+    keeper = in_doubt(changing=True)
+    tell_nothing(keeper)
+    keeper.server_changes(False)
+    assert to_send(keeper, 0.0) == goal("a")
+    keeper.on_goal(goal("c", 3))
+    keeper.on_status(status("c", GoalStatus.ACTIVE if is_taken else GoalStatus.REJECTED))
+    assert keeper.next_id == (None if is_taken else "a")
+
+
 def test_flood_of_goals_during_a_change_leaves_the_one_at_work():
     keeper = waited_for()
     keeper.server_changes(True)
     keeper.on_status(GoalStatusArray())  # the next server's, which takes nothing over
     for number in range(100):
         keeper.on_goal(goal(f"b{number}", 2))
+    tell_nothing(keeper)
     keeper.server_changes(False)
     assert keeper.to_send(0.0) == (goal("a"), CLIENT)
 
@@ -657,6 +706,53 @@ def test_newer_goal_comes_first_when_servers_die_again_and_again_of_the_one_at_w
     assert keeper.to_send(1.0) == (goal("a"), CLIENT)
 
 
+@pytest.mark.parametrize("client", [CLIENT, OTHER])
+def test_goal_that_is_not_sent_since_its_client_is_gone_leaves_no_older_one_of_that_client_at_work(client):
+    keeper = in_doubt(changing=True, client=client)
+    keeper.on_status(status("a", GoalStatus.ACTIVE))  # the next server has taken it
+    keeper.server_changes(False)
+    assert keeper.to_send(0.0) == (goal("b", 2), client)
+    keeper.client_is_gone(client)
+    assert keeper.is_delivered
+    assert (keeper.pending_id, keeper.strays) == ((None, {"a"}) if client == CLIENT else ("a", frozenset()))
+
+
+def replaced_before():
+    """A goal was replaced while its server was about to end, and a newer one of the other's client follows."""
+    keeper = GoalKeeper()
+    keeper.on_goal(goal("a"), CLIENT)
+    keeper.on_status(status("a", GoalStatus.ACTIVE))
+    keeper.server_changes(True)
+    keeper.on_goal(goal("b", 2), OTHER)
+    keeper.on_status(listed(("a", GoalStatus.PREEMPTED), ("b", GoalStatus.ACTIVE)))  # the old server's
+    keeper.on_goal(goal("c", 3), OTHER)
+    keeper.on_status(status("b", GoalStatus.ACTIVE))  # the next server has taken it
+    keeper.server_changes(False)
+    return keeper
+
+
+def test_goal_that_was_replaced_does_not_come_back_when_the_client_of_the_others_is_gone():
+    keeper = replaced_before()
+    assert to_send(keeper, 0.0) == goal("c", 3)
+    keeper.client_is_gone(OTHER)
+    assert (keeper.pending_id, keeper.strays) == (None, {"b"})
+
+
+def test_goal_that_was_replaced_does_not_come_back_at_the_next_change():
+    keeper = replaced_before()
+    assert len(keeper.keep_for_next_server({OTHER: "its client has ended"}, died=False)) == 2
+    assert first(keeper) == (None, None)
+
+
+def test_goal_at_work_that_is_not_sent_since_its_client_is_gone_leaves_the_newer_one():
+    keeper = in_doubt(changing=True)
+    tell_nothing(keeper)
+    keeper.server_changes(False)
+    assert keeper.to_send(0.0) == (goal("a"), CLIENT)
+    keeper.client_is_gone(CLIENT)
+    assert keeper.to_send(1.0) == (goal("b", 2), OTHER)
+
+
 def test_nothing_is_left_of_goals_that_are_dropped():
     keeper = in_doubt()
     keeper.drop()
@@ -671,3 +767,56 @@ def test_adopted_goal_goes_on_beside_a_newer_one_only_where_the_server_has_it(is
     keeper.on_goal(goal("b", 2), OTHER)
     keeper.on_status(status("a", GoalStatus.ACTIVE) if is_at_work else GoalStatusArray())
     assert first(keeper) == (("a", CLIENT) if is_at_work else ("b", OTHER))
+
+
+def adopted(former, changing=False):
+    keeper = GoalKeeper()
+    keeper.server_changes(changing)
+    assert former.kept_ids == tuple(wanted.goal_id.id for wanted, _ in former.kept)
+    for wanted, client in former.kept:
+        keeper.adopt(wanted, client)
+    assert keeper.kept == former.kept
+    return keeper
+
+
+def test_all_goals_are_adopted_while_the_server_is_replaced():
+    keeper = adopted(in_doubt(("b", "c")), changing=True)
+    assert (keeper.kept_ids, first(keeper)) == (("a", "b", "c"), ("a", CLIENT))
+    keeper.on_status(status("a", GoalStatus.ACTIVE))
+    keeper.server_changes(False)
+    assert keeper.to_send(0.0) == (goal("c", 3), OTHER)
+
+
+def test_goal_that_servers_die_of_may_come_first_again_for_another_keeper_but_both_are_kept():
+    keeper = in_doubt()
+    for _ in range(2):
+        assert keeper.keep_for_next_server({}, died=True) == []
+    assert first(keeper) == ("b", OTHER)
+    assert adopted(keeper).kept_ids == ("a", "b")
+
+
+def test_goals_that_no_server_has_heard_are_all_adopted():
+    keeper = GoalKeeper()
+    keeper.server_changes(True)
+    keeper.on_goal(goal("a"), CLIENT)
+    keeper.on_goal(goal("b", 2), OTHER)
+    keeper = adopted(keeper, changing=True)
+    keeper.on_status(status("b", GoalStatus.REJECTED))
+    assert first(keeper) == ("a", CLIENT)
+
+
+@pytest.mark.parametrize(
+    ("told", "pending", "following"),
+    [
+        ([("a", GoalStatus.ACTIVE), ("b", GoalStatus.PENDING)], "b", "a"),
+        ([("a", GoalStatus.ACTIVE), ("b", GoalStatus.REJECTED)], "a", "a"),
+        ([("a", GoalStatus.ACTIVE)], "a", "a"),
+        ([("a", GoalStatus.PREEMPTED), ("b", GoalStatus.ACTIVE)], "b", "b"),
+        ([("a", GoalStatus.PREEMPTED), ("b", GoalStatus.SUCCEEDED)], None, None),
+        ([], None, None),
+    ],
+)
+def test_server_tells_which_of_the_adopted_goals_goes_on(told, pending, following):
+    keeper = adopted(in_doubt())
+    keeper.on_status(listed(*told))
+    assert (keeper.pending_id, first(keeper)[0]) == (pending, following)

@@ -13,10 +13,11 @@ AT_WORK = (GoalStatus.PENDING, GoalStatus.ACTIVE)
 
 
 class Server:
-    """A server with one goal at work: it rejects some, and gives up those that are older than that one."""
+    """A server with one goal at work: it rejects some, and may give up those that are older than that one."""
 
-    def __init__(self, tell):
+    def __init__(self, tell, compares_stamps):
         self._tell = tell  # gets each status and result
+        self._compares_stamps = compares_stamps
         self.states = {}
         self.active = None
 
@@ -26,7 +27,7 @@ class Server:
             return
         if goal.goal.goal < 0:
             self._set(goal_id, GoalStatus.REJECTED)
-        elif self.active and goal.goal_id.stamp < self.active.goal_id.stamp:
+        elif self._compares_stamps and self.active and goal.goal_id.stamp < self.active.goal_id.stamp:
             self._set(goal_id, GoalStatus.RECALLED)
         else:
             former, self.active = self.active, goal
@@ -60,8 +61,9 @@ class World:
         self._draw = draw
         self.keeper = GoalKeeper()
         self.way = {"goal": deque(), "status": deque(), "result": deque(), "server": deque()}
-        self.server = Server(self._told)
-        self.stays = Server(lambda _: None)
+        self.compares_stamps = draw(st.booleans())
+        self.server = Server(self._told, self.compares_stamps)
+        self.stays = Server(lambda _: None, self.compares_stamps)
         self.count = 0
         self.heard = set()  # goals of which the message has come
         self.seen = set()  # those that the last status that came told to be active
@@ -125,8 +127,22 @@ class World:
             self.server.end(GoalStatus.SUCCEEDED)
             self.settle()
 
-    def change(self, takes_over, drops, goals):
-        """Replace the server; goals come meanwhile."""
+    def restart(self, changing=False):
+        """Replace the keeper: what the server tells meanwhile is lost for it, and it knows which goals were stored."""
+        for name in ("goal", "server"):
+            while self.way[name]:
+                self.deliver_one([name])
+        self.way["status"].clear()
+        self.way["result"].clear()
+        former, self.keeper = self.keeper, GoalKeeper()
+        self.keeper.server_changes(changing)
+        for goal, client in former.kept:
+            self.keeper.adopt(goal, client)
+        if not changing:
+            self.settle()
+
+    def change(self, takes_over, drops, goals, heard, restarts):
+        """Replace the server; goals come meanwhile, and some when the next server listens."""
         assert self.keeper.keep_for_next_server({}, died=False) == []
         self.keeper.server_changes(True)
         self.deliver(self._draw(st.integers(0, 5)))
@@ -139,18 +155,24 @@ class World:
             self.send(value)
             self.way["server"].clear()
         self.deliver(self._draw(st.integers(0, 10)))
+        if restarts:
+            self.restart(changing=True)
         first, _ = self.keeper.first_for_next_server
         if is_known:
             assert self.keeper.first_id == at_work, "its client would see a gap"
-        self.server = Server(self._told)
+        self.server = Server(self._told, self.compares_stamps)
         if takes_over and first is not None:
             self.server.take(first)
         self.server.tell_status()
         self.deliver()
+        for value in heard:
+            self.send(value)
+            self.deliver(self._draw(st.integers(0, 3)))
         self.keeper.server_changes(False)
         for goal_id in self.keeper.strays:
             self.server.cancel(goal_id)
         now = 0.0
+        self.settle()  # what is sent just when a client sends a newer goal may come after that one
         while not self.keeper.is_delivered:
             now += 1.0
             assert now < 10 * MOST_EARLIER, "it is never delivered"
@@ -167,7 +189,13 @@ STEPS = st.one_of(
     st.tuples(st.just("deliver"), st.tuples(st.integers(1, 5))),
     st.tuples(st.just("cancel"), st.just(())),
     st.tuples(st.just("reach"), st.just(())),
-    st.tuples(st.just("change"), st.tuples(st.booleans(), st.booleans(), st.lists(VALUES, max_size=3))),
+    st.tuples(st.just("restart"), st.just(())),
+    st.tuples(
+        st.just("change"),
+        st.tuples(
+            st.booleans(), st.booleans(), st.lists(VALUES, max_size=3), st.lists(VALUES, max_size=2), st.booleans()
+        ),
+    ),
 )
 
 

@@ -27,7 +27,8 @@ REPEATS = 3
 """How often a goal is repeated after its server died although nobody is known to wait: as often as the launcher starts
 a node again by default, before the configuration fails and the next one gets the goal."""
 NEVER_TAKEN = frozenset({GoalStatus.REJECTED, GoalStatus.RECALLED})  # the server goes on with what it had
-CONFIRMATIONS = 3  # statuses with a goal at work, every 0.2 s: more than a server needs to heed a cancellation
+CONFIRMATIONS = 3  # statuses, every 0.2 s: more than a server needs to show in them what it does with a message
+LONGEST_WAIT = 2.0  # s, wall, for these statuses: where the clock stands still, they do not come
 ENDS_OF_THE_NEWEST = frozenset({GoalStatus.REJECTED, GoalStatus.SUCCEEDED, GoalStatus.ABORTED})
 """How a goal ends by itself; the others are replaced or cancelled."""
 MOST_EARLIER = 10  # goals that the server may go back to: it has one at work, and rejects a goal within milliseconds
@@ -80,6 +81,8 @@ class GoalKeeper:
         self._cancelled: tuple[Any, Client | None] | None = None
         self._confirmations = 0  # statuses since then that have it at work
         self._sent = "", float("-inf")  # the goal that was sent to the present server last, and when
+        self._statuses = 0  # since the pending goal came
+        self._waits_since: float | None = None  # when an older goal was to be sent to the present server, but waited
 
     @property
     def pending(self) -> Any:
@@ -120,6 +123,28 @@ class GoalKeeper:
         return goal.goal_id.id if goal is not None else None
 
     @property
+    def kept(self) -> list[tuple[Any, Client | None]]:
+        """What another keeper must adopt, in this order, to go on: the goals, and who waits for each.
+
+        The pending goal is the last one. Without it there is none.
+        """
+        return [(copy.deepcopy(goal), client) for goal, client in self._kept]
+
+    @property
+    def kept_ids(self) -> tuple[str, ...]:
+        """Ids of the goals of `kept`."""
+        return tuple(goal.goal_id.id for goal, _ in self._kept)
+
+    @property
+    def _kept(self) -> list[tuple[Any, Client | None]]:
+        if self._goal is None:
+            return []
+        ids = [*self._earlier, self._goal.goal_id.id]
+        over = ids.index(self._accepted) if self._accepted in ids else 0  # what the one at work has replaced
+        earlier = [self._earlier[goal_id] for goal_id in ids[over:-1]]
+        return [*((one.goal, one.client) for one in earlier), (self._goal, self._client)]
+
+    @property
     def _first(self) -> tuple[Any, Client | None]:
         at_work = self._earlier.get(self._accepted or "")
         return (at_work.goal, at_work.client) if at_work and self._goal is not None else (self._goal, self.client)
@@ -153,9 +178,14 @@ class GoalKeeper:
         return self._changing
 
     def adopt(self, goal: Any, client: Client | None = None) -> None:
-        """Begin with the pending goal of an earlier keeper, unless the server's next status shows that it has ended."""
+        """Begin with a goal of an earlier keeper, unless the server's next status shows that it has ended.
+
+        Of several goals, the first is taken for the one at work, and the last is the pending one.
+        """
+        if self._goal is None:
+            self._accepted = goal.goal_id.id
+        self._set_aside()
         self._goal, self._client, self._doubted = copy.deepcopy(goal), client, True
-        self._accepted = goal.goal_id.id
 
     def keep_for_next_server(self, why_gone: Mapping[Client, str], died: bool) -> list[str]:
         """Decide which goals the next server gets; drop the others, and return why, a line for each.
@@ -169,6 +199,7 @@ class GoalKeeper:
             died: whether the server has died, and is not replaced on request.
         """
         dropped = []
+        self._forget_replaced()
         for goal_id, earlier in [*self._earlier.items()]:
             if earlier.client and why_gone.get(earlier.client):
                 self._finish(goal_id)
@@ -195,7 +226,7 @@ class GoalKeeper:
 
         The next server confirms nothing: it lacks the goal until it gets it.
         """
-        self._changing, self._cancelled, self._sent = changing, None, ("", float("-inf"))
+        self._changing, self._cancelled, self._sent, self._waits_since = changing, None, ("", float("-inf")), None
         self._doubted = self._doubted and changing
         if not changing:
             self._doubt_earlier(False)
@@ -207,28 +238,40 @@ class GoalKeeper:
         """Whether the server has the pending goal, or no goal is pending."""
         return self._goal is None or self.is_at_work
 
-    def keeps(self, goal_id: str) -> bool:
-        """Whether a goal is pending, or one that the server may go back to."""
-        return goal_id == self.pending_id or goal_id in self._earlier
-
     def to_send(self, now: float) -> tuple[Any, Client | None]:
         """Return the goal that must be sent again at `now` (s, a clock that never goes back), and who waits for it.
 
-        The first one for this server comes before the pending one. Both are None where nothing is to be sent.
+        The first one for this server comes before the pending one, once the server has shown that it has not heard of
+        that one itself: the older goal would replace it then. Both are None where nothing is to be sent.
 
         A server may publish its status before it receives goals, and a goal sent too early is lost. So the goal is sent
         repeatedly. A server that has the goal already ignores it.
         """
-        goal, client = self._first
-        if goal is None or goal.goal_id.id in self._listed:
-            goal, client = self._goal, self.client
-        if self.is_delivered or (goal.goal_id.id == self._sent[0] and now - self._sent[1] <= SEND_PERIOD):
+        goal, client = self._next
+        if goal is None or (goal.goal_id.id == self._sent[0] and now - self._sent[1] <= SEND_PERIOD):
             return None, None
+        if goal is not self._goal and self._statuses < CONFIRMATIONS:
+            self._waits_since = now if self._waits_since is None else self._waits_since
+            if now - self._waits_since < LONGEST_WAIT:
+                return None, None
         self._sent = goal.goal_id.id, now
         if goal is self._goal:
             self._repeats += self._is_repeat
             self._is_repeat = False
         return copy.deepcopy(goal), client
+
+    @property
+    def next_id(self) -> str | None:
+        """Id of the goal that the server gets next, or None. It may have changed since `to_send`."""
+        goal, _ = self._next
+        return goal.goal_id.id if goal is not None else None
+
+    @property
+    def _next(self) -> tuple[Any, Client | None]:
+        if self.is_delivered:
+            return None, None
+        goal, client = self._first
+        return (self._goal, self.client) if goal.goal_id.id in self._listed else (goal, client)
 
     def on_goal(self, goal: Any, client: Client | None = None) -> None:
         """Process a message of the topic `goal`; a newer goal replaces the pending one, unless the server rejects it.
@@ -258,7 +301,7 @@ class GoalKeeper:
         if is_newer or client:
             self._client, self._repeats, self._is_repeat = client, 0, False
         if is_newer:
-            self._goal, self._unnamed, self._guessed = copy.deepcopy(goal), 0, ""
+            self._goal, self._unnamed, self._statuses, self._guessed = copy.deepcopy(goal), 0, 0, ""
         self._doubted, self._cancelled = False, None
         self._note_accepted()
 
@@ -289,6 +332,7 @@ class GoalKeeper:
                 self._guessed = goal_id
         self._note_accepted()
         self._has_status = True
+        self._statuses += 1
         self._give_up_unnamed()
         self._doubt_cancellation()
         if not self._changing:
@@ -376,6 +420,25 @@ class GoalKeeper:
         self._finish(goal_id)
         if goes_back:
             self._go_back()
+
+    def client_is_gone(self, client: Client | None) -> None:
+        """Give up the goals of a client while they are sent: also what the server has at work for it.
+
+        The server has that one only since it was replaced: its client wanted the newer goal in its place.
+        """
+        self._forget_replaced()
+        for goal_id, earlier in [*self._earlier.items()]:
+            if earlier.client == client:
+                self._finish(goal_id)
+        if self._goal is not None and self._client == client:
+            self.give_up(self._goal.goal_id.id)
+
+    def _forget_replaced(self) -> None:
+        """Forget what the goal at work has replaced: its end may have been told while the server was being replaced."""
+        ids = [*self._earlier, self.pending_id or ""]
+        for goal_id in ids[: ids.index(self._accepted) if self._accepted in ids else 0]:
+            if goal_id not in self._listed:
+                self._earlier.pop(goal_id)
 
     @property
     def _is_without_id(self) -> bool:

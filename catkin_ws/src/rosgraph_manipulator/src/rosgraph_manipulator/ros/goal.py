@@ -2,9 +2,10 @@
 
 As long as the goal is pending, it is stored in the parameter `ACTION/resume_goal`. A server that knows the parameter
 continues the goal before it publishes its first status. Where it deletes the parameter, the goal is stored again, since
-that server may die, too. `~kept_goals` has the same goal for a manipulator that is started again: the former one may
-have died just after a server took the goal. A goal that came without an id is stored when the server has named it and
-works at it, or is replaced.
+that server may die, too. `~kept_goals` has the goal for a manipulator that is started again: the former one may have
+died just after a server took the goal. A goal that came without an id is stored when the server has named it and
+works at it, or is replaced. Where a newer goal has come of which the server has not told whether it takes it, the first
+parameter has the one at work, and `~kept_goals` has all.
 """
 
 from __future__ import annotations
@@ -50,12 +51,13 @@ class PendingGoal:
             ConfigurationError: the type is not installed.
         """
         self._action = action
-        self._parameters = (f"{action}/resume_goal", f"~kept_goals/{action.strip('/').replace('/', '__')}")
+        self._for_server = f"{action}/resume_goal"
+        self._for_manipulator = f"~kept_goals/{action.strip('/').replace('/', '__')}"
         self._goal_type = action_type + "Goal"
         self._keeper = GoalKeeper()
         self._clients = GoalClients(action)
         self._lock = threading.RLock()
-        self._stored: str | None = None  # id of the goal in the parameter
+        self._stored: tuple[str | None, tuple[str, ...]] = None, ()  # ids of the goals in the two parameters
         self._server: object = None  # what stands for the present server's connection
         self._old_server: object = None
         goal_class = _message_class(self._goal_type)
@@ -140,12 +142,12 @@ class PendingGoal:
         with self._lock:
             if why_gone:
                 rospy.logwarn("%s: goal %s is not sent to the new server: %s", self._action, goal.goal_id.id, why_gone)
-                self._keeper.give_up(goal.goal_id.id)
+                self._keeper.client_is_gone(client)
                 self._store()
-            elif self._keeper.keeps(goal.goal_id.id):
+            elif self._keeper.next_id == goal.goal_id.id:  # still: to ask may take a while
                 rospy.loginfo("sending the pending goal %s to the new server of %s", goal.goal_id.id, self._action)
                 self._goal_publisher.publish(goal)
-            return self._keeper.is_delivered
+        return False
 
     def _cancel_strays(self) -> None:
         for goal_id in self._keeper.strays:
@@ -179,46 +181,69 @@ class PendingGoal:
         return locked
 
     def _store(self, again: bool = False) -> None:
-        """Update the parameters, where another goal is the first for the next server, or the same one `again`."""
-        goal_id = self._keeper.first_id
-        is_unnamed = goal_id == "" and not self._keeper.server_is_changing
-        if (goal_id == self._stored or is_unnamed) and not (again and goal_id is not None):
+        """Update the parameters, where they do not have the present goals; where they do, only if `again`.
+
+        A goal that the server will name is not stored.
+        """
+        ids, first_id = self._keeper.kept_ids, self._keeper.first_id
+        if not (again or self._keeper.server_is_changing):
+            if first_id == "":
+                return
+            ids = tuple(filter(None, ids))
+        if (first_id, ids) == self._stored and not (again and ids):
             return
         with contextlib.suppress(rospy.ROSException, OSError):  # without a master there is nothing to keep it for
-            if goal_id is None:
-                self._delete()
+            if ids:
+                goals = [self._encoded(*one) for one in self._keeper.kept]
+                rospy.set_param(self._for_manipulator, goals[: len(ids)])  # only the last one has no id
+                if again or first_id != self._stored[0]:
+                    rospy.set_param(self._for_server, self._encoded(*self._keeper.first_for_next_server))
             else:
-                buffer = io.BytesIO()
-                goal, client = self._keeper.first_for_next_server
-                goal.serialize(buffer)
-                data = base64.b64encode(buffer.getvalue()).decode("ascii")
-                waits = {"client": [client.node, client.address]} if client else {}
-                for parameter in self._parameters:
-                    rospy.set_param(parameter, {"type": self._goal_type, "data": data, **waits})
-            self._stored = goal_id
+                self._delete()
+            self._stored = first_id, ids
+
+    def _encoded(self, goal: Any, client: Client | None) -> dict[str, Any]:
+        buffer = io.BytesIO()
+        goal.serialize(buffer)
+        data = base64.b64encode(buffer.getvalue()).decode("ascii")
+        return {"type": self._goal_type, "data": data, **({"client": [client.node, client.address]} if client else {})}
 
     def _recall(self, goal_class: Any, adopt: bool) -> None:
-        found = (rospy.get_param(parameter, None) for parameter in self._parameters)
-        left = next((value for value in found if value is not None), None)
-        if left is None:
-            return
-        try:
-            if not adopt or left["type"] != self._goal_type:
-                raise ValueError("it is from another time")
-            goal = goal_class().deserialize(base64.b64decode(left["data"], validate=True))
-            client = Client(*map(str, left["client"])) if "client" in left else None
-            if why_gone := self._clients.why_gone(client):
-                rospy.logwarn("%s: goal %s is not kept: %s", self._action, goal.goal_id.id, why_gone)
-                raise ValueError(why_gone)
-        except (KeyError, TypeError, ValueError, binascii.Error, genpy.DeserializationError):
+        if not adopt:
             self._delete()
             return
-        self._keeper.adopt(goal, client)
-        self._stored = goal.goal_id.id
-        rospy.loginfo("took over the pending goal %s of %s", goal.goal_id.id, self._action)
+        kept, first = (rospy.get_param(name, None) for name in (self._for_manipulator, self._for_server))
+        at_server = self._decoded([first], goal_class)
+        own = self._decoded(kept, goal_class) if isinstance(kept, list) else []
+        found = own or at_server
+        for goal, client in found:
+            if why_gone := self._clients.why_gone(client):
+                rospy.logwarn("%s: goal %s is not kept: %s", self._action, goal.goal_id.id, why_gone)
+            else:
+                self._keeper.adopt(goal, client)
+                rospy.loginfo("took over the pending goal %s of %s", goal.goal_id.id, self._action)
+        if self._keeper.first_id is None:
+            self._delete()
+            return
+        # The server has deleted its parameter where the goal has ended meanwhile.
+        first_id = at_server[0][0].goal_id.id if at_server else self._keeper.first_id
+        self._stored = first_id, tuple(goal.goal_id.id for goal, _ in own)
+        self._store()
+
+    def _decoded(self, kept: list[Any], goal_class: Any) -> list[tuple[Any, Client | None]]:
+        """Return the goals of a parameter, and who waits for each; none where one of them is from another time."""
+        goals = []
+        with contextlib.suppress(KeyError, TypeError, ValueError, binascii.Error, genpy.DeserializationError):
+            for one in kept:
+                if one["type"] != self._goal_type:
+                    return []
+                goal = goal_class().deserialize(base64.b64decode(one["data"], validate=True))
+                goals.append((goal, Client(*map(str, one["client"])) if "client" in one else None))
+            return goals
+        return []
 
     def _delete(self) -> None:
-        for parameter in self._parameters:
+        for parameter in (self._for_manipulator, self._for_server):
             with contextlib.suppress(KeyError):
                 rospy.delete_param(parameter)
 
