@@ -5,6 +5,7 @@ import contextlib
 import json
 import os
 import re
+import signal
 import sys
 import unittest
 import xml.etree.ElementTree as ET
@@ -15,6 +16,8 @@ import rospy
 import rosservice
 import rostest
 from helpers.waiting import wait_for
+from integration.rosgraph_manipulator.manipulator_harness import pid_of
+from metacontrol_msgs.msg import ActiveConfiguration, FunctionGrounding
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[2]
@@ -165,7 +168,16 @@ class NodeReference(unittest.TestCase):
         self.same("interface")
 
     def test_page_has_the_parameters_of_every_node(self):
+        self.kill_the_manipulator()
         self.same("parameter")
+
+    def kill_the_manipulator(self):
+        """Have the manipulator take over what an earlier one has deployed: only then it reads what that one kept."""
+        node, told = self.nodes["rosgraph_manipulator/rosgraph_manipulator"], []
+        rospy.Subscriber(f"{node}/active_configuration", ActiveConfiguration, told.append)
+        stable = FunctionGrounding.STABLE
+        wait_for(lambda: told and [f.state for f in told[-1].functions] == [stable], "a configuration is deployed")
+        os.kill(pid_of(node), signal.SIGKILL)
 
     def test_page_names_every_executable(self):
         named = set(re.findall(r"`?(\w+/\w+)`?", PAGE.read_text(encoding="utf-8")))
