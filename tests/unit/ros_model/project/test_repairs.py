@@ -1,5 +1,7 @@
 """Repairs of components: what metacontrol.yaml may say, what is refused, and what the manipulator is told."""
 
+import copy
+
 import pytest
 import yaml
 from ros_model.checks.whole_projects import check_project
@@ -38,7 +40,7 @@ def settings():
         "objectives": {"o_lift": {"function": "f_lift"}},
         "components": {
             "wind_sensor": {"node": "mast/anemometer", "repair": RESET | {"success": 0.95, "attempts": 4}},
-            "bow/winch": {"required_by": "all", "repair": LAUNCH | {"duration": 12.5}},
+            "bow/winch": {"required_by": "all", "repair": copy.deepcopy(LAUNCH) | {"duration": 12.5}},
             "battery": {"topic": "charge", "below": 0.2, "repair": {"service": "/ship/battery/swap", "duration": 300}},
             "stern/winch": {"node": "stern/winch"},
         },
