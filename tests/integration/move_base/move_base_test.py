@@ -13,7 +13,6 @@ import time
 import unittest
 import xmlrpc.client
 
-import actionlib
 import numpy as np
 import rosgraph
 import rospy
@@ -25,6 +24,7 @@ from geometry_msgs.msg import PolygonStamped, PoseStamped, TransformStamped, Twi
 from helpers.cases import case
 from helpers.programs import program
 from helpers.waiting import DEADLINE_S, wait_for
+from integration.action_clients import SureActionClient
 from map_msgs.msg import OccupancyGridUpdate
 from move_base_msgs.msg import MoveBaseAction, MoveBaseActionGoal, MoveBaseGoal
 from nav_msgs.msg import OccupancyGrid, Odometry, Path
@@ -133,7 +133,7 @@ class MoveBaseTest(unittest.TestCase):
         rospy.Subscriber("move_base/goal", MoveBaseActionGoal, cls.goals.append)
         rospy.Subscriber("move_base/status", GoalStatusArray, lambda message: setattr(cls, "status", message))
         cls.robot = Robot()
-        cls.client = actionlib.SimpleActionClient("move_base", MoveBaseAction)
+        cls.client = SureActionClient("move_base", MoveBaseAction)
         cls.addClassCleanup(cls.stop)
         cls.start()
         assert cls.client.wait_for_server(rospy.Duration(DEADLINE_S))
@@ -261,7 +261,7 @@ class MoveBaseTest(unittest.TestCase):
         self.send(2.0, 0.0)
         first = self.client.gh
         self.moving()
-        other = actionlib.SimpleActionClient("move_base", MoveBaseAction)
+        other = SureActionClient("move_base", MoveBaseAction)
         other.wait_for_server(rospy.Duration(DEADLINE_S))
         other.send_goal(MoveBaseGoal(target_pose=pose(0.0, 2.0)))
         wait_for(lambda: first.get_goal_status() == GoalStatus.PREEMPTED, "the first goal is preempted")

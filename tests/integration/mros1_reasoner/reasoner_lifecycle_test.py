@@ -3,12 +3,12 @@
 
 import unittest
 
-import actionlib
 import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticStatus
 from helpers.robot_side import Diagnostics, Manipulator, status
 from helpers.waiting import DEADLINE_S, wait_for
+from integration.action_clients import SureActionClient
 from metacontrol_msgs.msg import MvpReconfigurationAction, MvpReconfigurationGoal
 from metacontrol_msgs.srv import Feasible
 from reasoner_harness import NOTHING_RUNS, Reasoner
@@ -159,7 +159,7 @@ class LifecycleTest(unittest.TestCase):
         action = "drive/rosgraph_manipulator_action_server"
         with self.reasoner("/aborted", task_actions=f"{{o_moveA: {action}}}") as reasoner:
             reasoner.listener.logged("f_move runs scan_slow")
-            client = actionlib.SimpleActionClient(f"/aborted/{action}", MvpReconfigurationAction)
+            client = SureActionClient(f"/aborted/{action}", MvpReconfigurationAction)
             self.assertTrue(client.wait_for_server(rospy.Duration(DEADLINE_S)))
             client.send_goal(MvpReconfigurationGoal("somewhere"))
             done = reasoner.listener.decided("EXECUTED")

@@ -21,6 +21,7 @@ from geometry_msgs.msg import Twist
 from helpers.connections import hears, reaches
 from helpers.programs import program
 from helpers.waiting import DEADLINE_S, wait_for
+from integration.action_clients import SureActionClient
 from metacontrol_msgs.msg import (
     ActiveConfiguration,
     FunctionGrounding,
@@ -148,7 +149,7 @@ class PairTest(unittest.TestCase):
         cls.launcher = cls.manipulator = None
         cls.start_launcher()
         cls.start_manipulator()
-        cls.client = actionlib.SimpleActionClient("rosgraph_manipulator_action_server", MvpReconfigurationAction)
+        cls.client = SureActionClient("rosgraph_manipulator_action_server", MvpReconfigurationAction)
         cls.waiting = actionlib.ActionClient("wait", TestAction)
         assert cls.client.wait_for_server(rospy.Duration(DEADLINE_S)), cls.manipulator.said()
 

@@ -11,6 +11,7 @@ import rostest
 from actionlib.msg import TestAction
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from helpers.waiting import DEADLINE_S, wait_for, wait_for_equal
+from integration.action_clients import SureActionClient
 from integration.rosgraph_manipulator.manipulator_harness import HERE, PairTest, pid_of
 from metacontrol_msgs.msg import ChangeFunctionAction, ChangeFunctionGoal
 
@@ -47,7 +48,7 @@ class FunctionsTest(PairTest):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        cls.changes = actionlib.SimpleActionClient("rosgraph_manipulator/change_function", ChangeFunctionAction)
+        cls.changes = SureActionClient("rosgraph_manipulator/change_function", ChangeFunctionAction)
         assert cls.changes.wait_for_server(rospy.Duration(DEADLINE_S))
         cls.waiting = actionlib.ActionClient(ACTION, TestAction)
         cls.subscribers.append(rospy.Subscriber(f"{ACTION}/status", GoalStatusArray, cls.on_status))

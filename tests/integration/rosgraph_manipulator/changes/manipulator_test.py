@@ -13,6 +13,7 @@ from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from helpers.cases import case
 from helpers.connections import reaches
 from helpers.waiting import DEADLINE_S, wait_for
+from integration.action_clients import SureActionClient
 from integration.rosgraph_manipulator.manipulator_harness import is_alive, pid_of
 from metacontrol_msgs.msg import (
     ActiveConfiguration,
@@ -30,7 +31,7 @@ class ManipulatorTest(unittest.TestCase):
         cls.statuses = []  # a server, as the header of its connection, and the states of its goals
         rospy.Subscriber("rosgraph_manipulator/active_configuration", ActiveConfiguration, cls.on_active)
         rospy.Subscriber("wait/status", GoalStatusArray, cls.on_status)
-        cls.client = actionlib.SimpleActionClient("rosgraph_manipulator_action_server", MvpReconfigurationAction)
+        cls.client = SureActionClient("rosgraph_manipulator_action_server", MvpReconfigurationAction)
         assert cls.client.wait_for_server(rospy.Duration(DEADLINE_S))
 
     @classmethod
@@ -115,7 +116,7 @@ class ManipulatorTest(unittest.TestCase):
         return reaches(client.pub_goal, "/wait_server") and reaches(client.pub_cancel, "/wait_server")
 
     def test_finished_goal_is_not_resurrected(self):
-        client = actionlib.SimpleActionClient("wait", TestAction)
+        client = SureActionClient("wait", TestAction)
         self.assertTrue(client.wait_for_server(rospy.Duration(DEADLINE_S)))
         wait_for(lambda: self.is_reached(client.action_client), "the server is reached")
         client.send_goal_and_wait(TestGoal(7), rospy.Duration(DEADLINE_S))

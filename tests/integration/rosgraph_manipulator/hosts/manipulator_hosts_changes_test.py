@@ -6,11 +6,11 @@ import signal
 import tempfile
 from pathlib import Path
 
-import actionlib
 import psutil
 import rospy
 import rostest
 from helpers.waiting import DEADLINE_S, wait_for
+from integration.action_clients import SureActionClient
 from integration.rosgraph_manipulator.manipulator_harness import PairTest, is_alive, pid_of
 from manipulator_hosts_harness import ADDRESS, FAR_LAUNCHER, Respawned
 from metacontrol_msgs.msg import ChangeFunctionAction, ChangeFunctionGoal
@@ -55,7 +55,7 @@ class HostsChangesTest(PairTest):
         cls.far = Respawned()
         cls.addClassCleanup(cls.far.end)
         wait_for(lambda: pid_of(f"/{FAR_LAUNCHER}"), "the launcher of the other host is there")
-        cls.changes = actionlib.SimpleActionClient("rosgraph_manipulator/change_function", ChangeFunctionAction)
+        cls.changes = SureActionClient("rosgraph_manipulator/change_function", ChangeFunctionAction)
         assert cls.changes.wait_for_server(rospy.Duration(DEADLINE_S))
 
     def tearDown(self):
